@@ -11,7 +11,7 @@ import pytest
 from ground_files import STILL, TYPED, UP, ground_file
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link.ground import ground_link
+from microrad.link.ground import AtElevation, GroundLink, OtherConvention, ground_link
 from microrad.report.links import ground
 from microrad.report.links.budgets import links_csv, links_text
 from microrad.report.links.data import links_data
@@ -143,6 +143,65 @@ def test_a_link_that_closes_only_higher_up_says_from_where(study, tmp_path):
     assert said[2] == f"Of the elevations below it has the required 3 dB from {at} on."
     weak, _ = of_file(tmp_path, {"communication.transmit_power": "1 mW"})
     assert ground.sentences(with_ground(study, weak), weak)[2] == "At no elevation has it the required 3 dB."
+
+
+def at_elevations(*margins_db, fade_db=0.0, conventions=()):
+    """Links to a station at 20, 30, 40 deg … with these margins; 900 km away."""
+    steps = enumerate(margins_db)
+    found = [AtElevation((20 + 10 * k) * deg, 900e3, 1.0, fade_db, *[math.nan] * 4, margin) for k, margin in steps]
+    return GroundLink("geo", "Teide", tuple(found), (), conventions)
+
+
+BUDGETED = "The links are budgeted at 20 deg of elevation, 900 km from Teide."
+
+
+@pytest.mark.parametrize(
+    ("margins_db", "said"),
+    [
+        ((1.0,), []),  # one elevation is known
+        ((3.0, 4.0), ["The communication link has 1.00 dB more at 30 deg."]),  # the requirement itself
+        (
+            (2.0, 3.0, 5.0),
+            [
+                "The communication link has 3.00 dB more at 40 deg.",
+                "Of the elevations below it has the required 3 dB from 30 deg on.",
+            ],
+        ),
+        (
+            (2.0, 2.9),
+            ["The communication link has 0.90 dB more at 30 deg.", "At no elevation has it the required 3 dB."],
+        ),
+    ],
+)
+def test_the_required_margin_is_there_from_the_elevation_that_just_has_it(study, margins_db, said):
+    g = at_elevations(*margins_db)
+    assert ground.sentences(with_ground(study, g), g) == [BUDGETED, *said]
+
+
+@pytest.mark.parametrize(
+    ("gained", "said"),
+    [
+        (({"Communication": 0.0},), []),
+        (({"Communication": 0.1, "Answer": -0.3}, {"Communication": 0.2}), ["answer by 0.30 dB."]),
+        (({"Communication": 0.1}, {"Communication": -0.2}), ["communication by 0.20 dB."]),
+    ],
+)
+def test_a_convention_is_named_by_the_size_of_what_it_moves_and_only_where_it_moves_any(study, gained, said):
+    conventions = tuple(OtherConvention(f"k{n}", "a", "b", each) for n, each in enumerate(gained))
+    g = at_elevations(1.0, conventions=conventions)
+    first, *more = ground.sentences(with_ground(study, g), g)
+    assert first == BUDGETED
+    assert [each.partition(" moves the margin of ")[2] for each in more] == said
+    assert all(f"k{len(gained) - 1 if 'communication' in said[0] else 0} matters most" in each for each in more)
+
+
+@pytest.mark.parametrize(
+    ("fade_db", "labels"), [(0.0, ["margin", "required"]), (0.5, ["margin", "without", "required"])]
+)
+def test_the_margin_without_fades_is_drawn_only_where_there_are_fades(study, fade_db, labels):
+    g = at_elevations(1.0, 2.0, fade_db=fade_db)
+    marks = ground.over_elevation(with_ground(study, g), g).sheet.panels[0].marks
+    assert [mark.label.split()[0] for mark in marks] == labels
 
 
 def test_the_convention_that_matters_most_is_named_with_what_it_moves(study, tmp_path):

@@ -5,6 +5,7 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from microrad.report.page import templates as scripts
 from microrad.report.page.templates import templates
 from microrad.report.plotting import scales
 from microrad.report.plotting.figure import Figure
-from microrad.report.plotting.interactive import numbers, plot_of, text_of, words
+from microrad.report.plotting.interactive import numbers, plot_of, spoken, text_of, words
 from microrad.report.plotting.layout import layout
 from microrad.report.plotting.palette import (
     BLACK,
@@ -27,6 +28,7 @@ from microrad.report.plotting.palette import (
     WHITE,
     colour_at,
     thinned,
+    thinned_by_logarithm,
 )
 from microrad.report.plotting.sheet import (
     Area,
@@ -45,6 +47,7 @@ from microrad.report.plotting.sheet import (
     grid,
     region,
     segments,
+    shortened,
     stairs,
 )
 from microrad.report.plotting.svg import svg_of
@@ -342,6 +345,174 @@ def test_limits_are_finite_and_apart_whatever_is_drawn(values, log):
     svg_of(one(Line(y, y), y={"log": log}))
 
 
+@pytest.mark.parametrize(
+    ("at", "found"),
+    [
+        ([], []),
+        ([0.0], ["0"]),
+        ([0.0, 0.001], ["0", "0.001"]),
+        ([0.0, 0.0009], ["0", "9×10⁻⁴"]),
+        ([0.0, 9_999_999.0], ["0", "9999999"]),
+        ([0.0, 10_000_000.0], ["0", "10⁷"]),
+        ([-0.5, 0.25], ["−0.50", "0.25"]),
+        ([1.0, 1.0 + 1e-10], ["1", "1"]),
+        ([1.0, 1.5, 2.25], ["1.00", "1.50", "2.25"]),
+    ],
+)
+def test_ticks_have_the_same_decimals_and_powers_of_ten_from_a_thousandth_and_from_ten_million_on(at, found):
+    assert scales.texts(at) == found
+
+
+@pytest.mark.parametrize(
+    ("numbers_", "plain"), [([1e-3, 1e4], True), ([9e-4], False), ([1.1e4], False), ([1.0, 1e5], False), ([], True)]
+)
+def test_numbers_of_a_logarithmic_axis_are_plain_from_a_thousandth_to_ten_thousand(numbers_, plain):
+    assert scales.plain(numbers_) is plain
+
+
+@pytest.mark.parametrize(
+    ("ends", "ticks", "log", "found"),
+    [
+        ((1.0, 10.0), None, True, [float(k) for k in range(1, 11)]),
+        ((10.0, 1.0), None, True, [float(k) for k in range(1, 11)]),
+        ((2.0, 5.0), None, True, [2.0, 3.0, 4.0, 5.0]),
+        ((2.5, 4.5), None, True, [3.0, 4.0]),
+        ((1.0, 10.0), None, False, []),
+        ((1.0, 10.0), [1.0], True, []),
+        ((1.0, 1.1e6), None, True, []),
+    ],
+)
+def test_ticks_without_a_text_stand_on_logarithmic_axes_alone_ends_and_all(ends, ticks, log, found):
+    assert scales.minor(Axis(log=log, ticks=ticks), ends) == pytest.approx(found)
+
+
+def test_six_decades_have_ticks_between_and_more_have_none():
+    assert len(scales.minor(Axis(log=True), (1.0, 1e6))) == 55
+    assert scales.minor(Axis(log=True), (1.0, 1e6 * (1.0 + 1e-9))) == []
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "found"),
+    [
+        (1.0, 100.0, 9, [1.0, 10.0, 100.0]),  # the ends themselves
+        (1.0, 10.0, 9, [1.0, 2.0, 3.0, 5.0, 7.0, 10.0]),
+        (1.0, 10.0, 5, [1.0, 2.0, 5.0, 10.0]),
+        (1.0, 10.0, 3, [1.0, 3.0, 10.0]),
+        (1.0, 10.0, 2, [1.0, 10.0]),
+        (1.1, 99.0, 9, [2.0, 3.0, 5.0, 7.0, 10.0, 20.0, 30.0, 50.0, 70.0]),
+        (1.0, 1e4, 2, [1.0, 1e3]),
+        (1.0, 1e3, 4, [1.0, 10.0, 100.0, 1e3]),
+        (1.0, 1e3, 3, [1.0, 100.0]),
+    ],
+)
+def test_ticks_of_a_logarithmic_axis_take_its_ends_and_are_no_more_than_there_may_be(low, high, most, found):
+    assert scales.decades(low, high, most) == pytest.approx(found)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "found"),
+    [
+        (0.0, 1.0, 11, [0.1 * k for k in range(11)]),
+        (0.0, 1.0, 10, [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]),
+        (0.0, 1.0, 5, [0.0, 0.25, 0.5, 0.75, 1.0]),
+        (0.0, 1.0, 2, [0.0, 1.0]),
+        (3.0, 2.0, 5, [3.0]),
+    ],
+)
+def test_round_ticks_take_the_ends_and_are_no_more_than_there_may_be(low, high, most, found):
+    assert scales.rounds(low, high, most) == pytest.approx(found)
+
+
+def test_ticks_that_are_set_are_those_within_the_ends():
+    assert scales.ticks(Axis(ticks=[0.0, 1.0, 2.0, 2.1]), "x", (2.0, 0.0), 100.0) == {0.0: "0", 1.0: "1", 2.0: "2"}
+    words_ = {-1.0: "before", 0.0: "first", 2.0: "last"}
+    assert scales.ticks(Axis(ticks=words_), "y", (0.0, 2.0), 100.0) == {0.0: "first", 2.0: "last"}
+    assert scales.ticks(Axis(ticks=[-0.1, 5.0]), "y", (0.0, 2.0), 100.0) == {}
+
+
+@pytest.mark.parametrize(
+    ("length", "which", "count"), [(40.0, "y", 2), (250.0, "y", 11), (250.0, "x", 6), (1.0, "x", 2)]
+)
+def test_there_are_as_many_ticks_as_have_room(length, which, count):
+    assert len(scales.ticks(Axis(most=20), which, (0.0, 10.0), length)) == count
+
+
+@pytest.mark.parametrize(
+    ("text", "width", "height"),
+    [
+        ("", 0.0, 0.0),
+        ("0", 6.4, 12.0),
+        ("0\n00", 12.8, 24.0),
+        (" ~", 11.6, 12.0),
+        ("\x7f", 6.6, 12.0),
+        ("漢ｘé", 26.6, 12.0),
+    ],
+)
+def test_a_text_is_as_wide_as_its_longest_line_and_wide_letters_are_wide(text, width, height):
+    assert (scales.width_of(text, 10.0), scales.height_of(text, 10.0)) == pytest.approx((width, height))
+
+
+@pytest.mark.parametrize(
+    ("log", "low", "high", "found"),
+    [
+        (False, None, None, (0.95, 2.05)),
+        (False, 0.5, None, (0.5, 2.05)),
+        (False, None, 3.0, (0.95, 3.0)),
+        (False, 3.0, -1.0, (3.0, -1.0)),
+        (True, None, None, (2.0**-0.05, 2.0**1.05)),
+        (True, 0.0, 4.0, (2.0**-0.05, 4.0)),  # 0 is no end of a logarithmic axis
+    ],
+)
+def test_an_axis_has_its_own_ends_and_else_those_of_the_data_with_a_margin(log, low, high, found):
+    panels = [Panel(0, 0, marks=[Line(X, np.array([1.0, math.nan, 2.0]))]), Panel(0, 1, marks=[Words("far", 9.0, 9.0)])]
+    assert scales.limits(Axis(log=log, low=low, high=high), "y", panels) == pytest.approx(found)
+
+
+def test_a_logarithmic_axis_passes_by_data_that_are_not_positive():
+    values = np.array([0.0, 1.0, -2.0, 10.0])
+    limits = [scales.limits(Axis(log=log), "y", [Panel(0, 0, marks=[Line(values, values)])]) for log in (True, False)]
+    assert limits[0] == pytest.approx((10.0**-0.05, 10.0**1.05))
+    assert limits[1] == pytest.approx((-2.6, 10.6))
+
+
+def test_a_single_value_stands_in_the_middle_of_its_axis():
+    for value, log, found in ((3.0, False, (1.5, 4.5)), (0.0, False, (-0.5, 0.5))):
+        marks = [Rule(value, False), Span(-math.inf, math.inf, False, SKY)]
+        assert scales.limits(Axis(log=log), "y", [Panel(0, 0, marks=marks)]) == pytest.approx(found, rel=1e-3)
+
+
+def test_arms_bars_and_fields_are_within_the_limits():
+    two = np.array([1.0, 2.0])
+    bars = Bars(two, np.zeros(2), np.array([3.0, -4.0]), np.array([0.5, 0.5]), BLUE, upright=True)
+    field = Field(two, np.array([5.0]), np.zeros((1, 2)), 0.0, 1.0)
+    arms = np.array([[0.5, 0.5], [2.0, 2.0]])
+
+    def ends(which, *marks):
+        return scales.limits(Axis(), which, [Panel(0, 0, marks=list(marks))])
+
+    assert ends("x", bars) == pytest.approx((0.75 - 0.075, 2.25 + 0.075))
+    assert ends("y", bars) == pytest.approx((-4.35, 3.35))
+    assert (ends("x", field), ends("y", field)) == (pytest.approx((0.5, 2.5)), pytest.approx((4.5, 5.5)))
+    assert ends("x", replace(field, levels=np.array([0.0, 1.0]))) == (1.0, 2.0)
+    assert ends("y", replace(field, levels=np.array([0.0, 1.0]))) == pytest.approx((4.5, 5.5))
+    assert ends("y", Line(two, two, y_arms=arms)) == pytest.approx((0.5 - 0.175, 4.0 + 0.175))
+    assert ends("x", Line(two, two, x_arms=arms)) == pytest.approx((0.5 - 0.175, 4.0 + 0.175))
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "found"),
+    [
+        ([0.0, 0.0], [1.0, 2.0], (0.0, 2.1)),  # they stand on the lower end
+        ([0.0, 0.0], [-1.0, -2.0], (-2.1, 0.0)),
+        ([0.0, 0.5], [1.0, 2.0], (-0.1, 2.1)),
+        ([], [], (-0.05, 1.05)),
+    ],
+)
+def test_there_is_no_margin_where_all_bars_stand_on_the_end(start, end, found):
+    bars = Bars(np.arange(len(start)) * 1.0, np.array(start), np.array(end), np.ones(len(start)), BLUE)
+    assert scales.limits(Axis(), "x", [Panel(0, 0, marks=[bars])]) == pytest.approx(found)
+
+
 def test_texts_below_an_axis_stand_apart_and_nothing_leaves_the_sheet():
     sheet = one(
         Line(np.array([36000.001, 36000.009]), np.array([0.0, 1e6])), x={"title": "a (m)"}, y={"title": "b (m)"}
@@ -448,7 +619,245 @@ def test_a_legend_without_a_place_keeps_clear_of_the_curves():
     assert (key.x > middle[0]) == (key.y < middle[1])
 
 
+@pytest.mark.parametrize(
+    ("under", "corner"),
+    [
+        ((), ("right", "top")),
+        (("right top",), ("left", "top")),
+        (("right top", "left top"), ("left", "bottom")),
+        (("right top", "left top", "left bottom"), ("right", "bottom")),
+        (("right top", "left top", "left bottom", "right bottom"), ("right", "top")),  # each as bad as the others
+    ],
+)
+def test_a_legend_stands_in_the_first_corner_that_is_free(under, corner):
+    ends = {"x": {"low": 0.0, "high": 1.0}, "y": {"low": 0.0, "high": 1.0}}
+    at = [(0.97 if "right" in each else 0.03, 0.97 if "top" in each else 0.03) for each in under]
+    empty_line = Line(np.empty(0), np.empty(0), label="a curve of the legend alone")
+    sheet = one(*(Line(np.array([x]), np.array([y])) for x, y in at), empty_line, **ends)
+    sheet.panels[0].legend = Legend()
+    found = layout(sheet)
+    (key,), (placed,) = found.keys, found.placed
+    left, top, right, bottom = placed.inner
+    assert (
+        "left" if key.x < (left + right) / 3 else "right",
+        "top" if key.y < (top + bottom) / 2 else "bottom",
+    ) == corner
+
+
+@pytest.mark.parametrize(
+    ("place", "room"),
+    [("above", (0, 1)), ("below", (0, -1)), ("right", (-1, 0)), ("upper right", (-1, 0)), ("lower right", (-1, 0))],
+)
+def test_the_legend_of_a_sheet_stands_at_its_edge_and_takes_room_there(place, room):
+    sheet = one(Line(X, Y, label="a"), Line(X, Y, VERMILION, label="b"))
+    (alone,) = layout(sheet).placed
+    sheet.legend = Legend(place)
+    found = layout(sheet)
+    (key,), (placed,) = found.keys, found.placed
+    moved = [b - a for a, b in zip(alone.inner, placed.inner, strict=True)]
+    side = {(0, 1): 1, (0, -1): 3, (-1, 0): 2}[room]
+    assert [round(abs(each), 6) > 0 for each in moved] == [k == side for k in range(4)]
+    assert (moved[side] > 0) == (side == 1)
+    outer = placed.outer
+    if side == 2:
+        assert key.x >= outer[2] and key.x + key.width == pytest.approx(found.width - 3.0)
+        assert (key.y > found.height / 2) == (place == "lower right")
+    elif side == 1:
+        assert key.y + key.height <= outer[1]
+    else:
+        assert key.y >= outer[3]
+
+
+def test_a_legend_has_its_entries_by_columns_and_none_without_labels():
+    marks = [Line(X, Y, label=label) for label in ("a", "b", "long\nlabel", "a", "")]
+    sheet = one(*marks)
+    sheet.legend = Legend("above", 2, title="a title that is the widest of all of them in this legend")
+    (key,) = layout(sheet).keys
+    assert ([each.label for each in key.entries], key.rows, len(key.columns)) == (["a", "b", "long\nlabel"], 2, 2)
+    assert key.width == pytest.approx(scales.width_of(sheet.legend.title, 8.0))
+    assert key.height == pytest.approx(scales.LINE * 1.15 * 8.0 * 4)  # title, two lines, one
+    for legend, labels in ((Legend(only=(marks[1],)), ["b"]), (None, None)):
+        sheet.legend = legend
+        found = layout(sheet).keys
+        assert [[each.label for each in key.entries] for key in found] == ([labels] if labels else [])
+    nameless = one(Line(X, Y))
+    nameless.legend, nameless.panels[0].legend = Legend("above"), Legend()
+    assert layout(nameless).keys == []
+
+
+def test_what_is_not_labelled_has_no_texts_beside_it():
+    sheet = one(Line(X, Y), x={"labelled": False, "title": "time (s)"}, y={"title": "rms (rad)"})
+    (placed,) = layout(sheet).placed
+    assert (placed.x_shown, placed.y_shown) == (False, True)
+    assert turned(sheet)["layout"]["xaxis"]["showticklabels"] is False
+    assert set(texts(sheet)) == {"time (s)", "rms (rad)", *placed.y_ticks.values()}
+    other = one(Line(X, Y), y={"labelled": False})
+    (placed,) = layout(other).placed
+    assert (placed.x_shown, placed.y_shown) == (True, False)
+    assert set(texts(other)) == set(placed.x_ticks.values())
+    shown, hidden = layout(one(Line(X, Y))), layout(other)
+    assert hidden.placed[0].inner[0] == 2 * 3.0 and shown.placed[0].inner[0] > 2 * 3.0
+
+
+def test_room_is_kept_at_the_right_for_words_that_begin_at_the_end_alone():
+    def right(**more):
+        words_ = Words("a text that is long", **{"x": 1.0, "y": 4.0, "of_panel": "x", **more})
+        (placed,) = layout(one(Line(X, Y), words_)).placed
+        return placed.outer[2] - placed.inner[2]
+
+    wide = scales.width_of("a text that is long", 8.0)
+    assert right() == pytest.approx(wide + 3.0)
+    assert right(shift=(5.0, 0.0)) == pytest.approx(wide + 8.0)
+    assert max(right(anchor="end"), right(anchor="middle"), right(x=0.9), right(of_panel="")) < 20.0
+
+
+def test_a_colour_bar_has_round_ticks_unless_they_are_set():
+    cells = Field(X, Y, np.arange(9.0).reshape(3, 3), 0.0, 8.0, title="margin (dB)")
+    (placed,) = layout(one(cells)).placed
+    assert [*placed.bar_ticks.values()] == ["0", "2", "4", "6", "8"]
+    (placed,) = layout(one(replace(cells, ticks=(0.0, 8.0)))).placed
+    assert [*placed.bar_ticks.values()] == ["0", "8"]
+    (placed,) = layout(one(replace(cells, title=""))).placed
+    assert placed.bar is None and placed.bar_ticks == {}
+    sheet = one(replace(cells, title="", spoken="rate (Hz)"))
+    assert "rate: %{z:.5~g} Hz" in only(turned(sheet))["hovertemplate"]
+    assert "showscale" in only(turned(sheet)) and turned(sheet)["scales"] == []
+    sheet.panels[0].marks[0] = replace(cells, title="")
+    sheet.panels[0].title = "at 15 Hz"
+    assert "at 15 Hz: %{z:.5~g}<" in only(turned(sheet))["hovertemplate"]
+
+
+def test_a_field_of_one_row_or_column_has_cells_of_one():
+    cells = Field(np.array([2.0]), np.array([1.0, 3.0]), np.zeros((2, 1)), 0.0, 1.0)
+    assert scales.edges_of(cells, "x").tolist() == [1.5, 2.5]
+    assert scales.edges_of(cells, "y").tolist() == [0.0, 2.0, 4.0]
+    assert len([each for each in parts(one(cells), "rect") if each.get("stroke-width") == "0.6"]) == 2
+    leveled = replace(cells, levels=np.array([0.0, 1.0]))
+    assert (scales.edges_of(leveled, "x").tolist(), scales.edges_of(leveled, "y").tolist()) == ([1.5, 2.5], [1.0, 3.0])
+
+
+def test_rings_of_two_points_are_no_area():
+    two, three = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 0.0]])
+    for rings, count in (((two,), 0), ((), 0), ((two, three), 1)):
+        for hatched in (False, True):
+            sheet = one(Area(rings, SKY, hatched=hatched))
+            plot = turned(sheet)
+            assert len(plot["data"]) + len(plot["layout"]["shapes"]) == count
+            assert sum(each.get("fill-rule") == "evenodd" for each in parts(sheet, "path")) == count
+
+
+def test_words_that_stand_nowhere_are_not_drawn():
+    sheet = one(Line(X + 1.0, Y), Words("lost", math.nan, 4.0), Words("there", 1.0, math.nan), Words("", 1.0, 4.0))
+    assert not {"lost", "there"} & set(texts(sheet))
+    assert len(turned(sheet)["layout"]["annotations"]) == 2
+
+
+def test_a_marked_curve_is_one_trace_unless_it_has_fewer_markers_than_points():
+    def modes(**more):
+        return [each["mode"] for each in turned(one(Line(X, Y, marker="o", **more)))["data"]]
+
+    assert modes() == ["lines+markers"]
+    assert modes(every=[0, 2]) == ["lines", "markers"]
+    assert modes(dash="") == ["markers"]
+    many = np.arange(5_000.0)
+    traces = turned(one(Line(many, np.sin(many), marker="o")))["data"]
+    assert [each["mode"] for each in traces] == ["lines", "markers"]
+    assert len(traces[0]["x"]) < len(traces[1]["x"]) == 5_000
+    assert traces[1]["hoverinfo"] == "skip" and "hoverinfo" not in traces[0]
+
+
+@pytest.mark.parametrize(
+    ("of_line", "symbol", "colour"),
+    [
+        ({"marker": "s"}, "square", BLUE),
+        ({"marker": "s", "face": ""}, "square-open", BLUE),
+        ({"marker": "s", "face": "", "edge": SKY}, "square-open", SKY),
+        ({"marker": "s", "face": SKY}, "square", SKY),
+        ({"marker": "x"}, "x-thin-open", BLUE),
+    ],
+)
+def test_a_marker_without_a_colour_inside_is_open(of_line, symbol, colour):
+    made = only(turned(one(Line(X, Y, BLUE, "", **of_line))))["marker"]
+    assert (made["symbol"], made["color"]) == (symbol, colour)
+
+
+def test_the_hover_of_bars_says_where_they_begin_and_end():
+    bars = Bars(np.array([1.0, 2.0]), np.array([0.0, 1.0]), np.array([3.0, 4.0]), np.array([0.5, 0.5]), BLUE)
+    axes = {"x": {"title": "margin (dB)"}, "y": {"title": "place (m)"}}
+    lying = only(turned(one(bars, **axes)))
+    assert lying["hovertext"] == ["place: 0.75 to 1.25 m<br>margin: 3 dB", "place: 1.75 to 2.25 m<br>margin: 1 to 4 dB"]
+    assert (lying["orientation"], lying["x"], lying["base"], lying["marker"]["line"]["width"]) == (
+        "h",
+        [3, 3],
+        [0, 1],
+        0,
+    )
+    upright = only(turned(one(replace(bars, upright=True, edge=SKY), **axes)))
+    assert upright["hovertext"][1] == "margin: 1.75 to 2.25 dB<br>place: 1 to 4 m"
+    assert (upright["orientation"], upright["marker"]["line"]) == ("v", {"width": 0.5, "color": SKY})
+
+
+@pytest.mark.parametrize(
+    ("title", "said"),
+    [
+        ("time (s)", "time: %{x:.5~g} s"),
+        ("angle (°)", "angle: %{x:.5~g}°"),
+        ("count", "count: %{x:.5~g}"),
+        ("", "x: %{x:.5~g}"),
+        ("two\nlines (Hz)", "two lines: %{x:.5~g} Hz"),
+    ],
+)
+def test_a_value_is_spoken_with_the_name_and_unit_of_its_axis(title, said):
+    assert spoken(title, "x") == said
+
+
+def test_ticks_of_a_logarithmic_axis_that_are_set_are_texts_and_an_empty_list_is_none():
+    def axis(**more):
+        return turned(one(Line(X + 1.0, Y), x={"log": True, **more}))["layout"]["xaxis"]
+
+    assert (axis(ticks=[1.0, 2.5])["ticktext"], axis(ticks=[1.0, 2.5])["tickvals"]) == (["1", "2.5"], [1, 2.5])
+    linear = turned(one(Line(X, Y), x={"ticks": []}))["layout"]["xaxis"]
+    assert (linear["showticklabels"], linear["ticks"]) == (False, "")
+    assert "ticktext" not in turned(one(Line(X, Y), x={"ticks": [1.0]}))["layout"]["xaxis"]
+
+
 # ------------------------------------------------------------------------------------------------ points and numbers
+def test_a_curve_of_as_many_points_as_there_may_be_keeps_them_all():
+    x = np.arange(9.0)
+    assert thinned(x, np.sin(x), 9).tolist() == list(range(9))
+    assert thinned(x, np.sin(x), 8).size <= 8
+    assert (thinned(x[:0], x[:0]).size, thinned(x[:1], x[:1]).tolist()) == (0, [0])
+
+
+@pytest.mark.parametrize("size", [0, 1, 2])
+def test_on_a_logarithmic_axis_two_points_are_both_kept(size):
+    x = np.array([1.0, 10.0])[:size]
+    assert thinned_by_logarithm(x, x).tolist() == list(range(size))
+    many = np.geomspace(1.0, 100.0, 1000)
+    wave = np.where(np.arange(1000) == 500, 5.0, 0.0)
+    kept = thinned_by_logarithm(many, wave, 4).tolist()
+    assert {0, 500, 999} <= set(kept) and len(kept) <= 10
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [("x" * 34, "x" * 34), ("x" * 35, "x" * 33 + "…"), ("two\nlines\x07 here", "two lines here"), ("", "")],
+)
+def test_a_name_in_a_figure_has_at_most_34_characters_on_one_line(name, shown):
+    assert shortened(name) == shown
+
+
+def test_an_area_is_parted_where_either_curve_is_not_known():
+    gap = np.array([0.0, math.nan, 0.0, 0.0])
+    x, high = np.arange(4.0), np.array([1.0, 1.0, 1.0, math.inf])
+    assert [ring.tolist() for ring in between(x, gap, high, SKY, 1.0).rings] == [
+        [[0.0, 0.0], [0.0, 1.0]],
+        [[2.0, 0.0], [2.0, 1.0]],
+    ]
+    assert between(x[:0], x[:0], x[:0], SKY, 1.0).rings == ()
+    assert between(x, gap * math.nan, high, SKY, 1.0).rings == ()
+
+
 @pytest.mark.promise("report-11")
 def test_decimation_keeps_ends_peaks_and_gaps():
     x = np.arange(100_000.0)

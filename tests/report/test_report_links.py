@@ -14,9 +14,14 @@ import numpy as np
 import pytest
 
 from link_files import RECEIVERS, data_with, link_file, received_with, written
-from microrad.link import Swing
+from microrad import link
+from microrad.core.budget import Line
+from microrad.link import Swing, variation
 from microrad.link import study as link_study
+from microrad.link.acquisition.partner_search import LONGEST_LOOK_S, Scanned, Tracking
+from microrad.link.requirement import Requirement
 from microrad.mission.file import load_link
+from microrad.report import requirements
 from microrad.report.links import budgets as budget_views
 from microrad.report.links import figures as link_module
 from microrad.report.links import views as links
@@ -232,8 +237,10 @@ def test_fades_rarer_than_one_in_a_year_are_not_counted(plain):
     assert fade_sentences([rare]) == [
         "Fades below the required margin: less than one a year, for Gaussian errors of these spectra."
     ]
-    once = case(plain, fades_per_s=1.01 / YEAR_S, fade_s=2e-3)
-    assert "3.2e-08 a second of 2 ms each" in fade_sentences([once])[0]
+    for times in (1.0, 1.01):
+        once = case(plain, fades_per_s=times / YEAR_S, fade_s=2e-3)
+        assert re.search(r"3\.\d+e-08 a second of 2 ms each", fade_sentences([once])[0])
+        assert re.search(r"3\.\d+e-08 a second of 2 ms each", fade_sentences([rare, once])[0])
 
 
 def test_each_case_has_its_own_fades(plain):
@@ -300,6 +307,248 @@ def test_what_there_is_to_doubt_of_fades_is_said_once(plain):
         plain, fades_per_s=1.0, fade_s=1e-3, uncoded_penalty_db=math.nan, fade_warning="half of it is noise"
     )
     assert fade_sentences([doubtful, doubtful])[1:] == ["Half of it is noise."]
+
+
+# --------------------------------------------------------------------------------------------------- words on the links
+CLOSED, BELOW, ABOVE = (link.Interval(2.0, 4.0, *ends) for ends in ((False, False), (True, False), (False, True)))
+ANYWHERE = link.Interval(1.0, 5.0, True, True)
+MOST = ", most (+7.00 dB) near 3 W"
+
+
+@pytest.mark.parametrize(
+    ("intervals", "said"),
+    [
+        ((ANYWHERE,), "wherever it was looked at"),
+        ((BELOW,), "up to 4 W"),
+        ((ABOVE,), "from 2 W on"),
+        ((CLOSED,), "from 2 W to 4 W" + MOST),
+        ((BELOW, replace(ABOVE, low=4.5)), "up to 4 W and from 4.5 W on" + MOST),
+        ((CLOSED, replace(ABOVE, low=4.5)), "from 2 W to 4 W and from 4.5 W on" + MOST),
+    ],
+)
+def test_the_values_of_a_key_are_told_with_their_ends_and_the_best_where_it_is_inside(intervals, said):
+    solved = variation.Solved(intervals, (1.0, 5.0), 3.0, 7.0)
+    solution = link_study.Solution("communication.transmit_power", "W", "communication", 3.0, solved, 2.0, None)
+    assert links_words.solution_text(solution) == (
+        f"communication.transmit_power leaves the required 3 dB of communication {said}. Looked at: 1 W to 5 W. "
+        "The budgets below have 2 W."
+    )
+    none = replace(solution, solved=replace(solved, intervals=(), best_db=-0.5))
+    assert links_words.solution_text(none) == (
+        "No value of communication.transmit_power from 1 W to 5 W leaves the required 3 dB of communication: the most "
+        "is \u22120.50 dB at 3 W. No other was looked at."
+    )
+
+
+@pytest.mark.parametrize(("ratio", "lost"), [(0.999, True), (1.0, False), (25.0, False)])
+def test_light_below_its_noise_brings_no_angle(ratio, lost):
+    angle = Line("Noise-equivalent angle", 2e-6, "rad", "", "", "")
+    said = links_words._light(Tracking(3e-9, ratio, (), angle))
+    assert said.startswith("The answer brings 3 nW to the tracking sensor: ")
+    assert said.endswith(
+        f"less than its noise in a reading (signal to noise {ratio:.2g})."
+        if lost
+        else "noise-equivalent angle 2 µrad rms per axis and reading."
+    )
+    assert "less than its noise" in links_words._light(Tracking(3e-9, 1e-7, (), None))
+
+
+@pytest.mark.parametrize(
+    ("loss_db", "corrected", "said"),
+    [
+        (19.96, False, "left out, it costs 20.0 dB; a mirror that makes it needs 80 µrad of"),
+        (link.DEEPEST_DB, False, "left out, it costs 20.0 dB; a mirror that"),
+        (link.DEEPEST_DB + 0.01, False, "left out, it costs more than 20 dB; a mirror that"),
+        (3.0, True, "left out, it would cost 3.0 dB; a mirror that"),
+    ],
+)
+def test_point_ahead_says_what_it_costs_up_to_where_side_lobes_decide(loss_db, corrected, said):
+    text = links_words.point_ahead(link_study.PointAheadEffect(40e-6, corrected, 2.0, loss_db, 80e-6))
+    assert text.startswith("Point-ahead: up to 40 µrad, 2.0 half angles of the communication beam; ")
+    assert said in text
+    assert text.endswith("line of sight; corrected here." if corrected else "line of sight; NOT corrected here.")
+
+
+@pytest.mark.parametrize(("random", "ends"), [(None, ""), (False, ""), (True, " of both ends")])
+def test_the_mean_loss_is_of_both_ends_where_the_receiver_is_shaken_too(plain, random, ends):
+    receiving = None if random is None else SimpleNamespace(is_random=random)
+    study = SimpleNamespace(data=SimpleNamespace(receiving=receiving, requirement=plain.data.requirement))
+    c = case(plain, mean_loss_db=1.0)
+    narrow = replace(c, best=replace(c.best, at_limit=True))
+    wide = replace(c, best=replace(c.best, at_limit=False))
+    assert links_words.under_jitter_sentence(c, study).startswith(f"Under the jitter: mean pointing loss{ends} 1.00 dB")
+    assert " rad, the narrowest of the aperture. Power" in links_words.under_jitter_sentence(narrow, study).replace(
+        "\u00b5", " "
+    )
+    assert "the narrowest" not in links_words.under_jitter_sentence(wide, study)
+
+
+def test_what_moves_a_margin_is_told_by_three_inputs_and_only_where_any_does(plain):
+    ends = [(3.5, 2.5), (3.0, -math.inf), (3.1, 3.0), (3.0, 3.0)]
+    many = tuple(swing(plain, *each, key=f"communication.k{n}") for n, each in enumerate(ends))
+    own, *others = plain.tornados
+
+    def said(mine, theirs):
+        changed = (replace(own, swings=mine), *(replace(each, swings=theirs) for each in others))
+        return [each for each in links_words.consequences(replace(plain, tornados=changed)) if "What moves" in each]
+
+    first, beacon, answer = said(many, many[:1])
+    top = "communication.k0 1.00 dB; communication.k1 takes the link beyond its receiver; communication.k2 0.10 dB."
+    assert first.endswith(f"ten times more or less): {top}")
+    assert beacon == "What moves the margin of the beacon most: communication.k0 1.00 dB."
+    assert answer == "What moves the margin of the answer most: communication.k0 1.00 dB."
+    assert [len(said(*each)) for each in ((many, ()), ((), many), ((), ()))] == [1, 2, 0]
+
+
+def test_the_largest_rate_is_told_with_the_receiver_that_ends_it_and_a_wider_beam_from_half_a_decibel_on(plain):
+    beam = SimpleNamespace(radius_m=0.02)
+    communication = plain.file.mission.communication.model_copy(update={"beam": beam})
+    file = replace(plain.file, mission=plain.file.mission.model_copy(update={"communication": communication}))
+
+    def said(gained_db=0.0, rate=1e9, most=None):
+        receiver = None if most is None else SimpleNamespace(highest_data_rate_bit_s=most)
+        data = replace(plain.data, receiver=receiver)
+        radius = link_study.BeamRadius(0.03, gained_db)
+        changed = replace(plain, file=file, data=data, largest_rate_bit_s=rate, beam_radius=radius)
+        return links_words.consequences(changed)[:2]
+
+    assert said()[0].endswith(": 1 Gbit/s.")
+    assert said(most=1e9)[0].endswith(": 1 Gbit/s, the most that the receiver takes.")
+    assert said(most=1.1e9)[0].endswith(": 1 Gbit/s.")
+    assert said(rate=math.nan)[0].startswith("No data rate has the required 3 dB at ")
+    assert said(0.5)[1] == (
+        "The beam's radius of 20 mm leaves 0.50 dB to gain in the aperture of 50 mm: some 30 mm would be best."
+    )
+    assert not said(0.49)[1].startswith("The beam's radius")
+
+
+@pytest.mark.parametrize(
+    ("unit", "margin", "jitter", "said"),
+    [
+        ("dB", -10.0, None, "; to meet it, take communication.transmit_power = 50 W or more"),
+        ("dB", -10.01, None, "; to meet it, change communication.k0"),
+        ("dB", -10.01, (0.0, 0.0), "; to meet it, change communication.k0"),  # none of it to take away
+        ("dB", -10.01, (0.0, 3e-6), "; to meet it, take jitter.rms = 2 µrad or less"),
+        ("dB", -10.0, (0.0, 3e-6), "; to meet it, take communication.transmit_power = 50 W or more"),
+        ("dB", 3.0, (0.0, 3e-6), "; to move it, change communication.transmit_power, which may be 2.51 W at least"),
+    ],
+)
+def test_what_to_change_for_a_margin_goes_by_how_much_lacks(plain, monkeypatch, unit, margin, jitter, said):
+    swings = (
+        swing(plain, -math.inf, 3.0),
+        swing(plain, 1.0, 3.0, key="requirement.outage"),
+        swing(plain, 1.0, 3.0, key="communication.k0"),
+    )
+    tornado = link.Tornado("Communication", margin, swings)
+    shaken = None if jitter is None else SimpleNamespace(rms_rad=jitter)
+    m = SimpleNamespace(jitter=shaken, communication=SimpleNamespace(transmit_power_w=5.0))
+    study = SimpleNamespace(file=SimpleNamespace(mission=m), tornados=(tornado,))
+    r = Requirement("communication", "margin", unit, 0.0, margin, margin, "")
+    solved = SimpleNamespace(solved=SimpleNamespace(intervals=[link.Interval(0.0, 2e-6, True, False)]))
+    monkeypatch.setattr(link_study, "solve_key", lambda file, key: solved)
+    assert requirements.advice_for_links(study, r) == said
+    assert requirements.advice_for_links(study, replace(r, unknown="the sensor")) == ""
+    none = replace(tornado, swings=swings[:2])
+    if said.endswith("k0"):
+        assert requirements.advice_for_links(SimpleNamespace(file=study.file, tornados=(none,)), r) == ""
+    if "jitter" in said:
+        solved.solved.intervals.clear()
+        assert requirements.advice_for_links(study, r) == "; to meet it, change jitter.rms"
+
+
+@pytest.mark.parametrize(("unit", "advised"), [("%", "850 µrad"), ("rad", "781 µrad")])
+def test_a_cone_is_advised_wide_enough_for_what_is_asked_of_it(unit, advised):
+    p = SimpleNamespace(confident_divergence_rad=850e-6, required_divergence_rad=780.2e-6)
+    study = SimpleNamespace(open_loop=p, file=SimpleNamespace(mission=None))
+    r = Requirement("cone", "cone", unit, 99.7, 90.0, -9.7, "")
+    assert requirements.advice_for_links(study, r) == f"; to meet it, take beacon.divergence = {advised} or more"
+
+
+# ------------------------------------------------------------------------------------------------- fades of a series
+@pytest.mark.parametrize(
+    ("cost_db", "text"),
+    [
+        (0.0, "0.00 dB"),
+        (-1.5, "\u22121.50 dB"),
+        (math.inf, "beyond any power"),
+        (-math.inf, "none"),
+        (math.nan, "none"),
+    ],
+)
+def test_what_fades_cost_and_leave_is_said_where_it_is_no_number(cost_db, text):
+    assert links.cost_text(cost_db) == text
+
+
+def test_the_view_of_fades_has_what_is_known_and_what_is_not():
+    short = SimpleNamespace(value=1e-3, low=1e-4, high=math.inf)
+    long = SimpleNamespace(value=0.02, low=0.01, high=0.03)
+    fading = SimpleNamespace(
+        **{"code": "code", "source": "fades.csv", "target": 1e-6, "margin_db": 5.0, "margin_left_db": 3.0},
+        **{"interleaving": "block", "span_s": 0.005, "ratio": short, "lost": long, "penalty_db": 2.0},
+        fades=SimpleNamespace(
+            **{"level": 0.5, "share": 0.25, "per_second": 2.0, "mean_s": 0.01},
+            **{"median_s": math.nan, "ninetieth_s": 0.03, "longest_s": math.nan},
+        ),
+        curve=SimpleNamespace(span_s=(0.0, 0.01), penalty_db=(math.inf, 1.0)),
+    )
+    figures = [SimpleNamespace(name=name) for name in ("tornado", links_words.INTERLEAVER)]
+    view = links.fading_view(fading, figures)
+    said, found, fades, curve, shown, note = view.blocks
+    assert [row[1:] for row in found.rows] == [
+        ("10⁻³", "the series is too short for an interval"),
+        ("2 %", "1 % to 3 % with 99 % confidence, between parts of the series"),
+        ("2.00 dB", "brings the mean back to 10⁻⁶"),
+        ("3.00 dB", "of 5.00 dB at constant power"),
+    ]
+    assert fades.title.startswith("Fades below \u22123.01 dB,")
+    assert fades.rows == [("25 %", "2 Hz", "10 ms", "\u2013", "30 ms", "\u2013")]
+    assert curve.rows == [("none", "beyond any power"), ("10 ms", "1.00 dB")]
+    assert shown is figures[1] and isinstance(note, Soft)
+    assert "with a block interleaver over 5 ms: mean bit error ratio 10⁻³" in said
+    assert said.endswith("the fades cost 2.00 dB, which leaves a margin of +3.00 dB.")
+    fading.interleaving, fading.penalty_db = "none", math.inf
+    said = links.fading_view(fading).blocks[0]
+    assert "code without an interleaver: mean" in said and said.endswith(
+        "the fades cost more than any power makes up for."
+    )
+    assert links.fading_view(None, figures) is None
+
+
+@pytest.mark.parametrize(
+    ("needed_s", "said"),
+    [
+        (5e-3, ", in 2 s at most."),
+        (5.01e-3, "the partner's sensor needs 5.01 ms in place of the 5 ms that are stated; the scan waits."),
+        (
+            LONGEST_LOOK_S,
+            f"needs {quantity(LONGEST_LOOK_S, 's')} in place of the 5 ms that are stated; the scan waits.",
+        ),
+        (2 * LONGEST_LOOK_S, f"need more than {quantity(LONGEST_LOOK_S, 's')} in place of the 5 ms that are stated."),
+    ],
+)
+def test_a_scan_waits_for_light_only_beyond_the_time_that_is_stated(needed_s, said):
+    scanned = Scanned(None, 2.0, 100e-6, 28e-6, None, 5e-3, needed_s, None)
+    text = links.scan_words(scanned, 30e-6)
+    assert text.startswith("The scan covers 100 µrad about the predicted direction, for an uncertainty of 30 µrad rms")
+    assert text.endswith(said)
+
+
+@pytest.mark.parametrize(("count", "folded"), [(3, ""), (4, "The link under each of 4 pointing errors")])
+def test_the_table_of_pointing_errors_is_folded_from_four_on(plain, count, folded):
+    assert performance_table([case(plain)] * count, (), 0.003).folded == folded
+
+
+@pytest.mark.parametrize(
+    ("half_rad", "total_rad", "said"),
+    [
+        (None, 1e-6, []),
+        (3e-6, 1e-6, ["covers it, 2 µrad left"]),
+        (3e-6, 3e-6, ["covers it, 0 rad left"]),
+        (1e-6, 3e-6, ["2 µrad short"]),
+    ],
+)
+def test_a_total_is_covered_up_to_the_half_angle_itself(half_rad, total_rad, said):
+    assert links._covered(half_rad, total_rad) == said
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing

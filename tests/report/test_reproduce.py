@@ -489,6 +489,94 @@ def test_values_of_another_kind_are_refused_in_words(changed, change, words):
         manifest_reader.read_manifest(changed(lambda data: data.update(change)))
 
 
+def test_a_file_of_the_greatest_length_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "manifest.json"
+    path.write_text("{}   ", encoding="utf-8")
+    monkeypatch.setattr(manifest_reader, "MOST_BYTES", 5)
+    with pytest.raises(reproduce.ReproduceError, match="has no mission with file"):
+        manifest_reader.read_manifest(path)
+    monkeypatch.setattr(manifest_reader, "MOST_BYTES", 4)
+    with pytest.raises(reproduce.ReproduceError, match="a report of microrad has at most 0 MB"):
+        manifest_reader.read_manifest(path)
+
+
+def test_a_folder_in_place_of_the_manifest_is_refused_in_words(tmp_path):
+    (tmp_path / "manifest.json").mkdir()
+    with pytest.raises(reproduce.ReproduceError, match=r"is a folder without a manifest\.json; name a report\.html or"):
+        manifest_reader.read_manifest(tmp_path)
+
+
+def test_a_whole_number_has_at_most_18_digits_and_then_is_a_float():
+    found = manifest_reader._parsed("m.json", f"[{'9' * 18}, {'9' * 19}, -{'9' * 17}]")
+    assert [(type(each), each) for each in found] == [(int, 10**18 - 1), (float, 1e19), (int, 1 - 10**17)]
+
+
+def held(**data):
+    """A manifest with the least that is read."""
+    entry = {"file": "m.toml", "sha256": "0", "text": "", "text_sha256": hashlib.sha256(b"").hexdigest()}
+    return {"mission": entry, "versions": {}, "summary": {}, **data}
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"inputs": {str(i): "" for i in range(manifest_reader.MOST_FILES)}},
+        {"inputs": {"a": "x" * 12, "b": "x" * 8}},
+        {"mission": {**held()["mission"], "text": "x" * 20}},
+        {"mirror": None},
+        {"machine": "x86_64"},
+        {"versions": {str(i): "x" * 20 for i in range(30)}},
+    ],
+    ids=["files", "their length", "mission", "no mirror", "architecture", "versions"],
+)
+def test_as_much_as_a_manifest_may_have_is_read(tmp_path, monkeypatch, data):
+    monkeypatch.setattr(manifest_reader, "MOST_TEXT", 20)
+    path = tmp_path / "manifest.json"
+    path.write_text(json.dumps(held(**data)), encoding="utf-8")
+    assert manifest_reader.read_manifest(path).data == held(**data)
+
+
+def test_several_faults_of_a_manifest_are_told_together(tmp_path):
+    path = tmp_path / "manifest.json"
+    path.write_text(json.dumps(held(summary=3, versions=3, files_sha256=[])), encoding="utf-8")
+    said = "no versions as names with texts; no files_sha256 as names with texts; no summary, against which"
+    with pytest.raises(reproduce.ReproduceError, match=said):
+        manifest_reader.read_manifest(path)
+
+
+def test_what_was_changed_is_told_part_by_part(tmp_path):
+    """The mission's text, the mirror's, that of a file, the summary; what is as it was is not told."""
+    entry = held()["mission"]
+    data = held(
+        mission={**entry, "text": "changed"},
+        mirror={**entry, "text": "changed"},
+        inputs={"a.csv": "", "b.csv": "changed", "c.csv": "never stated"},
+        inputs_sha256={"a.csv": entry["text_sha256"], "b.csv": entry["text_sha256"]},
+        summary_sha256=manifest_reader.hash_of_summary({"a": 1.0}),
+    )
+    found = manifest_reader.altered_parts(manifest_reader.ReadManifest(tmp_path / "manifest.json", data, ""))
+    parts = ["the mission's text", "the mirror file's text", "the text of b.csv", "the text of c.csv", "its summary"]
+    assert [text.partition(" was changed after")[0] for text in found] == parts
+    own = hashlib.sha256(b"changed").hexdigest()[:16]
+    assert found[0].endswith(f"its SHA-256 is {own}…, and {entry['text_sha256'][:16]}… is stated")
+    same = manifest_reader.ReadManifest(tmp_path / "manifest.json", held(), "")
+    assert (manifest_reader.altered_parts(same), same.named) == ((), {})
+
+
+def test_a_file_beside_the_report_is_read_up_to_the_greatest_length_and_inside_its_folder(tmp_path, monkeypatch):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "a.csv").write_bytes(b"12345")
+    (tmp_path / "outside.csv").write_bytes(b"1")
+    at = manifest_reader.ReadManifest(folder / "manifest.json", held(), "")
+    monkeypatch.setattr(manifest_reader, "MOST_BYTES", 5)
+    assert manifest_reader.content_beside(at, "a.csv") == b"12345"
+    assert manifest_reader.content_beside(at, "../outside.csv") is None
+    assert manifest_reader.content_beside(at, "absent.csv") is None
+    monkeypatch.setattr(manifest_reader, "MOST_BYTES", 4)
+    assert manifest_reader.content_beside(at, "a.csv") is None
+
+
 def test_a_text_that_is_too_long_is_refused(changed, monkeypatch):
     monkeypatch.setattr(manifest_reader, "MOST_TEXT", 1000)
     with pytest.raises(reproduce.ReproduceError, match=r"a mission text of \d+ characters"):
@@ -578,6 +666,35 @@ def test_a_plain_name_is_kept():
     assert [manifest_reader.plain(name) for name in EVIL] == [""] * len(EVIL)
 
 
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("x" * 100, True),
+        ("x" * 101, False),
+        ("a/" + "x" * 100, True),
+        ("ü" * 50, True),  # two bytes each
+        ("ü" * 50 + "x", False),
+        ("a/b/c/d.txt", True),
+        ("a/b/c/d/e.txt", False),
+        ("a//b.txt", False),
+        ("a.", False),
+        ("a b ", False),
+    ],
+)
+def test_a_plain_name_has_at_most_four_parts_of_100_bytes(name, kept):
+    assert manifest_reader.plain(name) == (name if kept else "")
+
+
+def test_a_named_file_does_not_take_the_place_of_another(tmp_path):
+    """The mission's own file is there already, under that name; the ending is kept."""
+    at = manifest_reader.ReadManifest(tmp_path / "m.json", held(inputs={"m.csv": "new", "../n.longerthan8": "x"}), "")
+    (tmp_path / "m.csv").write_text("old", encoding="utf-8")
+    assert manifest_reader._place(tmp_path, 3, "m.csv", at) == "named-file-3.csv"
+    assert manifest_reader._place(tmp_path, 4, "../n.longerthan8", at) == "named-file-4"
+    texts = {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()}
+    assert texts == {"m.csv": "old", "named-file-3.csv": "new", "named-file-4": "x"}
+
+
 def test_names_that_were_replaced_are_put_back_before_comparing():
     moved = {'../a"b<.tle': "named-file-0.tle"}
     again = reproduce.restored('{"file": "named-file-0.tle"}', moved, reproduce._in_json)
@@ -628,6 +745,60 @@ def test_the_relative_difference_is_over_the_larger_number():
     assert compared.relative(0.0, 1e-9) == 1.0
     assert compared.relative(float("inf"), 1.0) == float("inf")
     assert compared.relative(float("inf"), float("inf")) == 0.0
+    assert compared.relative(0.0, -compared.SMALLEST) == compared.relative(compared.SMALLEST, 0.0) == 0.0
+    assert compared.relative(0.0, 2.0 * compared.SMALLEST) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "limit", "same"),
+    [
+        (1.0, 1.5, 0.5, True),  # the limit itself
+        (1.5, 1.0, 0.5, True),
+        (-1.0, 1.0, 0.5, False),
+        (1.0, 1.5, 0.25, False),
+        (0.0, compared.SMALLEST, 0.0, True),
+        (0.0, 2.0 * compared.SMALLEST, 0.0, False),
+    ],
+)
+def test_two_numbers_are_the_same_up_to_the_limit_itself(was, now, limit, same):
+    found = compared.compare({"a": was}, {"a": now}, lambda *_: limit)
+    assert [(d.was, d.now, d.allowed) for d in found.differences] == ([] if same else [(was, now, limit)])
+    assert compared.compare({"a": was}, {"a": now}, None).differences != ()
+
+
+def test_a_difference_reads_as_a_line_with_its_size_and_what_is_allowed():
+    apart = compared.Difference("margin_db.beacon", 2.0, 1.0, 0.5, 0.25)
+    assert str(apart) == "margin_db.beacon: was 2 and is 1, relative difference 0.5 (0.25 apart is allowed)"
+    assert apart.data() == {
+        "place": "margin_db.beacon",
+        "was": 2.0,
+        "now": 1.0,
+        "relative_difference": 0.5,
+        "allowed_distance": 0.25,
+    }
+    word = compared.Difference("name", "PID", "PI", math.nan)
+    assert str(word) == "name: was PID and is PI"
+    assert (word.data()["relative_difference"], word.data()["allowed_distance"]) == (None, 0.0)
+    third = compared.Difference("a", 1 / 3, 1 / 3 + 2.0**-53, 1e-16)  # nine digits do not tell them apart
+    assert str(third).startswith("a: was 0.33333333333333331 and is 0.33333333333333343, relative")
+
+
+def test_a_tree_in_place_of_a_value_is_one_difference():
+    """A record, and a list, against something else; the unit beside a record is that of now."""
+    was, now = {"a": {"b": 1.0}, "c": [1.0], "d": 2.0, "e": 3.0}, {"a": 1.0, "c": 1.0, "d": {"b": 2.0}, "e": [3.0]}
+    found = compared.compare(was, now, None)
+    assert {d.place: (d.was, d.now) for d in found.differences} == {key: (was[key], now[key]) for key in was}
+    assert found.numbers == 0
+    units = [unit for _, unit, _, _ in compared.leaves({"unit": "dB", "x": [1.0]}, {"unit": "rad", "x": [1.0]}, "")]
+    assert units == ["rad", "rad"]
+    assert [unit for _, unit, _, _ in compared.leaves({"unit": 3, "x": 1.0}, {"unit": 3, "x": 1.0}, "")] == ["", ""]
+
+
+@pytest.mark.parametrize(
+    ("length", "shown"), [(120, "x" * 120), (121, "x" * 119 + "\u2026"), (0, "")], ids=["fits", "one more", "none"]
+)
+def test_a_text_for_a_terminal_has_at_most_120_characters(length, shown):
+    assert compared.clipped("x" * length) == shown
 
 
 def a_millionth(place, unit, was, now):
@@ -665,6 +836,11 @@ def test_numbers_in_words_are_roundings_and_counts_are_not():
     assert differ("in view 15 times", "in view 16 times")
     assert not differ("x 0.02 dB", "x 0.03 dB")
     assert not differ("x \u22123.1 dB", "x \u22123.2 dB")
+    assert not differ("x 20 dB", "x 19 dB") and not differ("x -19 dB", "x -20 dB")  # a twentieth itself
+    assert differ("x 20 dB", "x 18 dB") and differ("x \u221220 dB", "x 20 dB")
+    assert differ("1.00e-5 of the time", "2.00e-5 of the time")  # its digits are not behind the point of 1e-5
+    assert not differ("1.00e-5 of the time", "1.04e-5 of the time")
+    assert differ("x 0.02 dB", "x 0.04 dB")
     assert compared.compare("x 3.1 dB", "x 3.2 dB", None).differences
 
 
@@ -686,6 +862,31 @@ def test_a_column_with_more_rows_or_another_heading_is_told():
     assert places(table, "a (s),b\n1.0000001,2\n3,\n") == []
     assert places(table, "a (s),b\n1,2\n3,4\n5,\n") == ["fig: a (s), row 3", "fig: b, row 2"]
     assert places(table, "a (s),c\n1,2\n3,\n") == ["fig: b", "fig: c"]
+    assert places(table, "a (s),b\n1,2\n") == ["fig: a (s), row 2"]
+    assert [(d.was, d.now) for d in compared.compare_tables("fig", "a\n1\n", "b\n1\n", None).differences] == [
+        ("a column", compared.MISSING),
+        (compared.MISSING, "a column"),
+    ]
+
+
+@pytest.mark.parametrize(
+    "was", ["", "a\r1\r", "a\n" + "1" * 200_000 + "\n"], ids=["empty", "other line ends", "a cell too long"]
+)
+def test_data_that_are_no_table_lack_its_columns(was):
+    found = compared.compare_tables("fig", was, "a\n1\n", None)
+    assert [(d.place, d.was, d.now) for d in found.differences] == [("fig: a", compared.MISSING, "a column")]
+
+
+@pytest.mark.parametrize(("heading", "unit"), [("a (s)", "s"), ("a", ""), ("a (s) later", ""), ("a (x) (m/s)", "m/s")])
+def test_the_unit_of_a_column_stands_in_brackets_at_the_end(heading, unit):
+    asked = []
+
+    def allowed(place, of, was, now):
+        asked.append((place, of, was, now))
+        return 0.0
+
+    compared.compare_tables("fig", f"{heading}\n1\n", f"{heading}\n2\n", allowed)
+    assert asked == [(f"fig: {heading}, row 1", unit, 1.0, 2.0)]
 
 
 def test_a_text_is_the_same_as_itself_whatever_numbers_one_may_see_in_it():
@@ -707,3 +908,91 @@ def test_a_number_of_thousands_of_digits_is_no_way_to_stop_it(changed, not_run):
     assert [d.place for d in found.differences] == ["margin_db.beacon"]
     assert found.largest == float("inf")
     json.loads(json.dumps(reproduction_data(found), allow_nan=True))
+
+
+# ---------------------------------------------------------------------------------------------------------------- words
+def outcome(**changes):
+    """What came out of a run of which nothing differs."""
+    settings = {
+        **{"path": "r.html", "numbers": 7, "largest": 0.0, "differences": (), "altered": (), "unlike": {}},
+        **{"undetailed": "", "files": (), "read": (), "layout": False, "page": ()},
+    }
+    return reproduce.Reproduction(**{**settings, **changes})
+
+
+DIFFERENCE = compared.Difference("a", 2.0, 1.0, 0.5)
+COMPARED = "(7 numbers compared, largest relative difference 0)"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, f"nothing differs {COMPARED}."),
+        ({"largest": 1e-9}, "the numbers agree (7 numbers compared, largest relative difference 1e-09)."),
+        ({"files": ("f.csv",), "read": ("f.csv",)}, f"the numbers agree {COMPARED}."),
+        ({"files": ("f.csv", "g.csv"), "read": ("f.csv",)}, "other than this run's: data of figures."),
+        ({"layout": True}, f"the numbers agree {COMPARED}; other than this run's: the page's layout."),
+        ({"layout": True, "page": ("line 1: x",)}, "other than this run's: the page's text."),
+        ({"files": ("f.csv",), "layout": True}, "other than this run's: data of figures, the page's layout."),
+        ({"differences": (DIFFERENCE,)}, f"the report is not reproduced {COMPARED}: 1 differs."),
+        ({"differences": (DIFFERENCE,) * 2}, f"the report is not reproduced {COMPARED}: 2 differ."),
+        ({"altered": ("its page was changed",)}, "not reproduced {}: it was changed after it was written."),
+        (
+            {"differences": (DIFFERENCE,), "altered": ("its page was changed",)},
+            "not reproduced {}: 1 differs, and it was changed after it was written.",
+        ),
+    ],
+)
+def test_the_headline_says_what_is_not_the_same(changes, said):
+    found = outcome(**changes)
+    assert reproduce.headline(found).startswith("r.html: ")
+    assert reproduce.headline(found).endswith(said.replace("{}", COMPARED))
+    assert found.same == ("not reproduced" not in said)
+
+
+@pytest.mark.parametrize(
+    ("changes", "lines"),
+    [
+        ({}, []),
+        ({"differences": (DIFFERENCE,) * 40}, ["a: was 2 and is 1, relative difference 0.5"] * 40),
+        (
+            {"differences": (DIFFERENCE,) * 41},
+            ["a: was 2 and is 1, relative difference 0.5"] * 40 + ["and 1 more (all of them with --json)"],
+        ),
+        ({"altered": ("its page was changed",)}, ["its page was changed"]),
+        (
+            {"files": ("f.csv", "g.csv", "h.csv"), "read": ("g.csv",)},
+            [
+                "data of figures, compared as numbers, not byte for byte the same: g.csv",
+                "data of figures, not byte for byte the same: f.csv, h.csv; their numbers are not compared, since they "
+                "do not stand beside the report, or have rows of their own on each machine",
+            ],
+        ),
+        (
+            {"files": ("g.csv",), "read": ("g.csv",)},
+            ["data of figures, compared as numbers, not byte for byte the same: g.csv"],
+        ),
+        ({"page": ("1", "2", "3"), "layout": True}, ["the page's text is not what this run writes: 1; 2; 3"]),
+        (
+            {"page": ("1", "2", "3", "4"), "layout": True},
+            ["the page's text is not what this run writes: 1; 2; 3; and 1 more"],
+        ),
+        ({"layout": True}, ["the page's layout or drawings are not what this run writes; its text is"]),
+    ],
+)
+def test_the_text_lists_what_differs_below_the_headline(changes, lines):
+    found = outcome(**changes)
+    first, basis, *rest = reproduce.reproduction_text(found).splitlines()
+    assert (first, basis) == (reproduce.headline(found), "Same machine and versions: compared to the last bit.")
+    assert rest == lines
+
+
+def test_a_report_without_hashes_of_its_files_has_no_other_figures(tmp_path):
+    now = {"files_sha256": {"figures/a.csv": "1", "figures/a.svg": "1", "b.csv": "1", "figures/c.csv": "1"}}
+
+    def other(**data):
+        return reproduce._other_files(manifest_reader.ReadManifest(tmp_path / "m.json", held(**data), ""), now)
+
+    assert other() == other(files_sha256={}) == []
+    assert other(files_sha256={"figures/a.csv": "1", "figures/d.csv": "1"}) == ["figures/c.csv", "figures/d.csv"]
+    assert other(files_sha256={"figures/a.csv": "2", "figures/c.csv": "1", "b.csv": "2"}) == ["figures/a.csv"]

@@ -140,7 +140,10 @@ MISSING = "(none)"
 
 
 def _columns(text: str) -> dict[str, list[str]]:
-    heading, *rows = csv.reader(io.StringIO(text)) or [[]]
+    try:
+        heading, *rows = list(csv.reader(io.StringIO(text))) or [[]]
+    except csv.Error:  # what is no table has no columns
+        return {}
     return dict(zip(heading, map(list, zip_longest(*rows, fillvalue="")), strict=False))
 
 
