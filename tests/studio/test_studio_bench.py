@@ -198,6 +198,9 @@ def test_a_unit_that_is_typed_together_with_its_channel_stays():
     apart = replace(form, setting=replace(form.setting, drive_unit="mV"))
     again = mirror_form.edited(apart, listing, replace(apart.setting, drive=2, drive_unit="V")).setting
     assert (again.drive, again.drive_unit) == (2, "V")
+    odd = replace(form, setting=replace(form.setting, drive_unit="mV", output_unit="um"))
+    kept = mirror_form.edited(odd, listing, replace(odd.setting, rate="1 Hz")).setting
+    assert (kept.drive_unit, kept.output_unit, kept.rate) == ("mV", "um", "1 Hz")  # neither channel was changed
 
 
 @pytest.mark.parametrize(

@@ -297,9 +297,9 @@ def test_a_closed_terminal_ends_the_server_unless_it_is_to_outlive_it(monkeypatc
     monkeypatch.setattr(server.signal, "getsignal", lambda number: before[0])
     monkeypatch.setattr(server.signal, "signal", lambda *how: heard.append(how))
     server._end_with_terminal(print)
+    assert heard == [(signal.SIGHUP, print)]
     before[0] = signal.SIG_IGN
     server._end_with_terminal(print)
-    assert heard == [(signal.SIGHUP, print)]
     before[0] = signal.SIG_DFL
     monkeypatch.delattr(server.signal, "SIGHUP")
     server._end_with_terminal(print)
