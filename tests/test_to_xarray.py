@@ -40,6 +40,22 @@ def test_each_array_has_its_unit_and_meaning_and_comes_back_from_a_file(name, tm
             assert again[key].attrs["units"] == found[key].attrs["units"]
 
 
+def test_errors_are_in_the_data_set_where_the_recordings_tell_them():
+    """Of two realisations of two periods there are noise and distortion, of one without a period neither."""
+    periodic = [
+        microrad.recording_from_arrays(
+            np.tile(drive, 2), 2.0 * np.tile(drive, 2) + 0.01 * np.roll(drive, k).repeat(2), 2000.0, period_samples=4096
+        )
+        for k, drive in enumerate(TWICE[:, :4096])
+    ]
+    response = microrad.measure_frequency_response(periodic)
+    found = response.to_xarray()
+    for of in ("noise", "distortion"):
+        assert_array_equal(found[f"{of}_standard_error"], getattr(response, f"{of}_standard_error"))
+        assert found[f"{of}_standard_error"].attrs["long_name"] == f"the part of one sigma that is {of}"
+        assert f"{of}_standard_error" not in RESULTS["measured"].to_xarray()
+
+
 def test_values_are_found_by_their_names():
     measured, fit, loop, trace, ensemble = (each.to_xarray() for each in RESULTS.values())
     straight = measured.response.sel(output=RECORDING.output_names[1], input=RECORDING.input_names[1])

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from microrad.core import kernels
 from microrad.core.periodic import delayed
+from microrad.lab.identify.coupled import channels as channels_module
 from microrad.lab.identify.coupled import held_out as held_out_module
 from microrad.lab.identify.coupled import hysteretic, identify_coupled, ladder, linear, linear_errors, wiring
 from microrad.lab.identify.coupled import mirror_file as coupled_mirror_file
@@ -487,6 +488,131 @@ def test_hysteretic_stiffness_begins_with_a_linear_model(hysteretic_records):
     for start in (None, SimpleNamespace(modes=None)):
         with pytest.raises(IdentificationError, match="no coupled linear model of this order to begin with"):
             hysteretic.hysteretic_stiffness(hysteretic_records, start, lambda *_: None)
+
+
+def climbed(monkeypatch, options, *, lines=11, two_amplitudes=True, failing=()):
+    """The models that a ladder tries, where each is found unless it fails; the best linear one has the order 4."""
+
+    def judged(self, fit):
+        name, *self.left = self.left
+        self.done += 1
+        told.append((self.done, self.total, name))
+        if name in failing:
+            return
+        self.fits[name] = SimpleNamespace(delay_s=self.done)
+        order = int(re.search(r"order (\d+)", name)[1])
+        kind = name.split(",")[0]
+        losses = np.full(50, 1.0 + 0.1 * (order - 4) ** 2)
+        self.found.append(
+            (
+                SimpleNamespace(kind=kind, order=order, parameters=order),
+                SimpleNamespace(losses=(losses,), share=losses.sum()),
+            )
+        )
+
+    told, delays = [], []
+    monkeypatch.setattr(ladder._Ladder, "_judge", judged)
+    monkeypatch.setattr(ladder._Ladder, "_so_far", lambda self: "")
+    monkeypatch.setattr(ladder, "best_delay", lambda response, order, steps: told.append((0, order, "delay")) or 0.5)
+    monkeypatch.setattr(ladder, "line_spectra", lambda *_: None)
+    monkeypatch.setattr(ladder, "partial", lambda fit, *given: delays.append((fit.__name__, *given[1:3])))
+    amplitudes = SimpleNamespace(
+        periodic=True, fitted_class=np.array([0, int(two_amplitudes)]), amplitudes_v=np.array([1.0, 2.0]), fitted=()
+    )
+    one = ladder._Ladder(amplitudes, SimpleNamespace(freq_hz=np.arange(lines)), np.ones(1), lambda candidate: None)
+    reported = []
+    one.climb(options, lambda *args: reported.append(args))
+    assert reported[0][2] == "delay" and reported[-1] == (one.done, one.total, "done") and one.done == one.total
+    return [name for *_, name in told], one, delays, told
+
+
+def test_the_ladder_goes_from_small_to_large_and_hysteresis_begins_at_the_best_linear_model(monkeypatch):
+    names, one, delays, told = climbed(monkeypatch, LadderOptions((2,), (6, 4, 2, 8)))
+    assert names == [
+        "delay",
+        "per axis, order 2 each",
+        *(f"coupled linear, order {n}" for n in (2, 4, 6, 8)),
+        "hysteretic stiffness, order 4",
+        "hysteretic stiffness, order 6",
+    ]
+    assert [total for _, total, _ in told] == [8, *[7] * 7]
+    assert one.refused == []
+    # the delay of each coupled linear model is that of the one before it
+    assert [given[2] for given in delays[:5]] == [0.5, 0.5, 2, 3, 4]
+
+
+def test_no_order_is_tried_that_the_lines_of_the_response_cannot_fix(monkeypatch):
+    names, *_ = climbed(monkeypatch, LadderOptions((), (4, 10, 11), (6, 12)))
+    assert names[1:] == [
+        *(f"coupled linear, order {n}" for n in (4, 6, 10)),
+        "hysteretic stiffness, order 6",
+    ]
+    assert climbed(monkeypatch, LadderOptions((), (4, 8), (12,)))[0][-2:] == [
+        "hysteretic stiffness, order 4",
+        "hysteretic stiffness, order 8",
+    ]
+    names, *_ = climbed(monkeypatch, LadderOptions((), (12, 16)), lines=5)
+    assert names[1:] == ["coupled linear, order 4", "hysteretic stiffness, order 4"]
+    assert climbed(monkeypatch, LadderOptions((), (2, 4)))[0][-1:] == ["hysteretic stiffness, order 4"]
+
+
+def test_the_ladder_goes_on_where_models_fail_and_without_hysteresis_for_one_amplitude(monkeypatch):
+    failing = [f"coupled linear, order {n}" for n in (2, 6)]
+    names, _, delays, _ = climbed(monkeypatch, LadderOptions((), (2, 6, 8)), failing=failing)
+    assert names[-1] == "hysteretic stiffness, order 8"
+    assert [given[2] for given in delays[:3]] == [0.5, 0.5, 0.5]
+    names, *_ = climbed(monkeypatch, LadderOptions((), (2, 6, 8)), failing=[*failing, "coupled linear, order 8"])
+    assert names[-1:] == ["hysteretic stiffness, order 2"]
+    names, one, *_ = climbed(monkeypatch, LadderOptions((2,), (2, 4), (6,)), two_amplitudes=False)
+    assert names[1:] == ["per axis, order 2 each", "coupled linear, order 2", "coupled linear, order 4"]
+    (refused,) = one.refused
+    assert refused.model == "hysteretic stiffness"
+    assert refused.reason.startswith("all fitted records have one amplitude, 1 V rms: hysteresis cannot be told")
+
+
+def test_a_search_that_was_ended_is_noted_and_warned_of_and_so_is_the_largest_model():
+    assert hysteretic._note(True, 10) == ""
+    assert hysteretic._note(False, 10) == "the search was ended before its optimum, after 10 steps on all records"
+    small, large, other = (
+        SimpleNamespace(name=f"{kind} {order}", kind=kind, order=order, note=note)
+        for kind, order, note in (("linear", 2, ""), ("linear", 4, "of note"), ("per axis", 8, ""))
+    )
+    every = SimpleNamespace(candidates=[small, large, other])
+    assert list(ladder._Ladder._warnings(every, small, small)) == []
+    told = (
+        "The least error is that of the largest model of its kind that was tried, linear 4: a larger one may have less."
+    )
+    assert list(ladder._Ladder._warnings(every, small, large)) == [told]
+    assert list(ladder._Ladder._warnings(every, large, small)) == ["linear 4: of note."]
+    assert list(ladder._Ladder._warnings(every, large, large)) == ["linear 4: of note.", told]
+
+
+def test_records_without_a_period_are_of_one_length():
+    first, second = (
+        Recording(f"chirp {n}", "", np.zeros((n, 1)), np.zeros((n, 1)), 1.0, ("u",), ("y",)) for n in (900, 1000)
+    )
+    with pytest.raises(IdentificationError) as caught:
+        channels_module._periodic([first, second])
+    assert str(caught.value) == (
+        "chirp 1000: 1000 samples, where chirp 900 has 900 samples; cut all records to one length and period."
+    )
+    assert channels_module._periodic([first, first]) is False
+    assert channels_module._periodic([replace(first, period_samples=100)]) is True
+    with pytest.raises(
+        IdentificationError, match="900 samples in periods of 100, where chirp 900 has 900 samples in p"
+    ):
+        channels_module._periodic([replace(first, period_samples=300), replace(first, period_samples=100)])
+
+
+def test_a_drive_of_nothing_rests_at_nothing():
+    assert _rounded_bias([SimpleNamespace(drive=np.zeros((8, 2)), period_samples=None)]).tolist() == [0.0, 0.0]
+
+
+def test_the_loss_of_a_record_without_period_has_its_length():
+    error, output = np.array([[1.0], [2.0], [3.0], [4.0]]), np.array([[1.0], [-1.0], [1.0], [-1.0]])
+    record = Recording("r", "", output, 2.0 * output, 1.0, ("u",), ("y",))
+    np.testing.assert_allclose(held_out_module._loss(error, record), [0.25, 1.0, 2.25, 4.0])
+    np.testing.assert_allclose(held_out_module._loss(error, replace(record, period_samples=2)), [1.25, 2.5])
 
 
 def test_a_mirror_file_has_a_name_and_the_errors_that_there_are(found, hysteretic_records):

@@ -30,7 +30,7 @@ from microrad.lab.identify import (
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, _bound_gradient, _not_identified
 from microrad.lab.identify.hysteresis.plant_fit import _not_identified as _not_identified_jointly
 from microrad.lab.identify.mirror_file import _names
-from microrad.lab.identify.records import fastest_rate, lead, si_records, transient
+from microrad.lab.identify.records import fastest_rate, lead, memory, si_records, transient, turning_points
 from microrad.lab.identify.selection import candidates
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import colour_inflation, may_be_chance
@@ -506,6 +506,16 @@ def test_thresholds_are_refused(thresholds):
 
 # --------------------------------------------------------------------------------------------------- shared machinery
 @pytest.mark.promise("identify-18")
+def test_what_a_mirror_remembers_is_ramps_over_what_the_drive_has_swept():
+    """Eighths of the range up to the last known sample; where that is nothing, of 1 V."""
+    found = memory(np.array([1.0, 5.0, 9.0, 3.0, -7.0]), 4)
+    np.testing.assert_array_equal(found.sum(axis=1), [0.0, 4.0, 8.0, 8.0, 8.0])
+    np.testing.assert_array_equal(found[1], [1.0] * 4 + [0.0] * 4)
+    still = memory(np.array([2.0, 2.0, 3.5]), 2)
+    np.testing.assert_array_equal(still[:, :2], [[0.0, 0.0], [0.0, 0.0], [1.0, 0.5]])
+    assert turning_points(np.full(50, 3.0)).size == 0
+
+
 def test_transient_is_one_sweep_of_the_range():
     assert transient(sine(100)) == pytest.approx(500 * 0.6782, abs=2)  # up from the middle, then down to -0.9
     assert transient(np.linspace(0, 1, 1000)) == 500  # never more than half

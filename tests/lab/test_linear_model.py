@@ -11,8 +11,10 @@ from scipy.signal import lfilter
 
 from microrad.core import lti
 from microrad.lab.identify.linear import axis, order
+from microrad.lab.identify.linear import fit as fit_module
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import (
+    choose,
     fit_linear,
     fit_percent,
     output_error,
@@ -491,6 +493,117 @@ def test_creep_is_looked_for_up_to_ten_radians_of_the_lowest_frequency():
     np.testing.assert_allclose(lags, [0.01, 0.0316, 0.1, 0.316, 1.0, 3.16, 10.0], rtol=1e-3)
     assert axis._lags(SimpleNamespace(excited_hz=(160.0, 1000.0))) == ()  # 9.9 ms
     assert axis._lags(SimpleNamespace(excited_hz=(159.0, 1000.0))) == (0.01,)
+
+
+@pytest.mark.parametrize(
+    ("lines", "channels", "orders"),
+    [
+        (20, (1, 1), [1, 2, 3, 4, 5, 6, 7, 8]),
+        (9, (1, 1), [1, 2, 3, 4, 5, 6, 7, 8]),
+        (8, (1, 1), [1, 2, 3, 4, 5, 6, 7]),
+        (2, (1, 1), [1]),
+        (1, (1, 1), [1]),
+        (40, (2, 1), [4, 8, 12, 16, 20, 24, 28]),
+        (29, (1, 2), [4, 8, 12, 16, 20, 24, 28]),
+        (28, (2, 2), [4, 8, 12, 16, 20, 24]),
+        (4, (2, 2), [1]),
+    ],
+)
+def test_orders_are_tried_as_far_as_the_lines_of_a_response_fix_them(lines, channels, orders):
+    response = SimpleNamespace(freq_hz=np.arange(1.0, lines + 1.0), response=np.zeros((lines, *channels)))
+    assert fit_module._candidates(response, None) == orders
+
+
+def test_the_order_of_least_criterion_is_chosen_with_what_its_neighbours_would_gain():
+    of = [
+        fit_module.OrderScore(*row)
+        for row in ((2, 4, 900.0, 100, 920.0, 0.0), (3, 6, 110.0, 0, 140.0, 0.0), (5, 10, 104.5, 94, 150.0, 0.0))
+    ]
+    chosen, reason = choose(of)
+    assert chosen == 3
+    assert reason == (
+        "order 3 has the least criterion, 140 (chi-square + parameters x ln values); squared distance over its "
+        "variance, per degree of freedom, by order: 2: 9, 3: 110, 5: 1.11 (1 is what a true model leaves); order 2 is "
+        "worse by 780; order 5 gains 5.5 in chi-square for 4 parameters more, which is worth less than it costs"
+    )
+    assert choose(of[1:])[1].endswith("(1 is what a true model leaves)" + reason[reason.index("; order 5") :])
+    assert choose(of[:2])[1].endswith("; order 2 is worse by 780; a larger order was not tried")
+    assert choose(of[:1]) == (2, choose(of[:1])[1])
+    assert choose(of[:1])[1].endswith("by order: 2: 9 (1 is what a true model leaves); a larger order was not tried")
+    worse = [of[1], replace(of[2], chi_square=120.0)]
+    assert "order 5 gains 0.0 in chi-square for 4 parameters more" in choose(worse)[1]
+
+
+@pytest.mark.parametrize(
+    ("hz", "decay_s", "told"), [(50.0, 6.0, True), (50.0, 4.0, False), (2.0, 6.0, False), (4.0, 6.0, True)]
+)
+def test_a_mode_that_rings_for_five_times_the_record_and_turns_three_times_in_it_is_told(hz, decay_s, told):
+    """In a record of 1 s. One that drifts is none, and of what is told the size says what it was fitted to."""
+    pole = -1.0 / decay_s + 1j * math.sqrt((2 * np.pi * hz) ** 2 - 1.0 / decay_s**2)
+    drive = philox(1).standard_normal((1000, 1))
+    record = recording(drive, drive, 1000.0)
+    model = ModalModel(np.array([pole]), np.ones((1, 1)) + 0j, np.ones((1, 1)) + 0j, np.zeros((1, 1)))
+    own = simulate(model, drive - drive[:1], 1000.0).std()
+    for share, words in (
+        (0.26, "most likely a steady tone that the drive"),
+        (0.24, "most likely noise, which a spare"),
+    ):
+        found = fit_module._tones(model, [record], np.array([own / share]), "zero-order")
+        assert len(found) == told
+        if told:
+            assert found[0].startswith(
+                f"pole at {hz:.4g} Hz rings for {decay_s:.3g} s, the recording lasts 1 s and cannot"
+            )
+            assert words in found[0]
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([-2.0, -1024.0], None),
+        (
+            [-1.0, -2.0, -1024.0],
+            "pole at 1 Hz outside the excited band, 2 to 1024 Hz: the recording shows only the flank, so take it",
+        ),
+        ([-2.0, -1025.0], "pole at 1020 Hz outside"),
+        (
+            [-1.5, -1.0, -2048.0],
+            "poles at 1, 1.5, 2050 Hz outside the excited band, 2 to 1024 Hz: the recording shows only the flank, so "
+            "take them",
+        ),
+    ],
+)
+def test_a_root_at_an_end_of_the_band_lies_in_it(values, words):
+    known = Uncertainty(
+        2 * np.pi * np.array(values, dtype=complex),
+        np.empty(0),
+        np.empty(0, dtype=complex),
+        np.empty(0),
+        *(np.array([[each]]) for each in (1.0, 0.01, 1.0, 0.01)),
+        0.0,
+    )
+    found = range_warnings(known, (2.0, 1024.0))
+    assert len(found) == (words is not None)
+    if words:
+        assert found[0].startswith(words)
+        assert found[0].endswith("as a fit of that flank (drift, delay), not as dynamics of the mirror.")
+        of_table = range_warnings(known, (2.0, 1024.0), of="table", what="tabulated")[0]
+        assert "outside the tabulated band" in of_table and "the table shows only" in of_table
+        assert of_table.endswith("not as dynamics.")
+
+
+def test_neighbouring_lines_are_merged_from_1800_on_each_by_its_power():
+    """Pairs of lines, of which the second has three times the power of the first."""
+    freq = np.arange(1.0, 1801.0)
+    power = np.where(np.arange(1800) % 2, 3.0, 1.0)[:, None, None]
+    values = (freq + 1j)[:, None, None]
+    few = SimpleNamespace(freq_hz=freq[:1799], response=values[:1799], drive_power=power[:1799])
+    assert order._merged(few) == (few.freq_hz, few.response, few.drive_power)
+    every = SimpleNamespace(freq_hz=freq, response=values, drive_power=power)
+    merged_hz, merged, total = order._merged(every)
+    np.testing.assert_allclose(merged_hz, freq.reshape(-1, 2).mean(axis=1))
+    np.testing.assert_allclose(total[:, 0, 0], 4.0)
+    np.testing.assert_allclose(merged[:, 0, 0], (freq[::2] + 3.0 * freq[1::2]) / 4.0 + 1j)
 
 
 @pytest.mark.parametrize(("dc", "warned"), [(-2.02, False), (-2.2, True), (2.02, False), (2.2, True), (-1.8, True)])

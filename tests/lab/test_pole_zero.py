@@ -15,6 +15,7 @@ from microrad.lab.identify.hysteresis.plant_fit import coloured_scatter, held
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
 from microrad.lab.identify.linear import axis, pole_zero
 from microrad.lab.identify.linear.axis import fit_axis
+from microrad.lab.identify.linear.fit import OrderScore
 from microrad.lab.identify.linear.modal import late
 from microrad.lab.identify.linear.pole_zero import PoleZero, PoleZeroProblem, Root
 from microrad.lab.identify.linear.response import response_from_records
@@ -29,6 +30,42 @@ NONE = np.zeros((0, 0))  # nothing of a record's own
 
 RATE, FINE = 20_000.0, 4
 GAIN = 8e-5
+
+
+@pytest.mark.parametrize(("most", "marks"), [(9, None), (8, None), (4, [0, 2, 4, 6])])
+def test_lines_are_merged_by_what_they_are_worth_where_there_are_more(most, marks):
+    """Eight lines, of which every second one has twice the error: a quarter of the worth."""
+    freq, error = np.geomspace(1.0, 128.0, 8), np.tile([0.1, 0.2], 4)
+    values = freq * (1.0 + 0.5j)
+    response = SimpleNamespace(
+        freq_hz=freq,
+        response=values[:, None, None],
+        standard_error=error[:, None, None],
+        drive_power=(2.0 + 0j) * np.arange(1.0, 9.0)[:, None, None],
+    )
+    found = pole_zero.merged(response, most)
+    power = 2.0 * np.arange(1.0, 9.0)
+    if marks is None:
+        for one, other in zip(found, (freq, values, error, power), strict=True):
+            assert_allclose(one, other, rtol=0)
+        return
+    worth = 1.0 / error**2
+    total = np.add.reduceat(worth, marks)
+    assert_allclose(found[0], np.add.reduceat(worth * freq, marks) / total)
+    assert_allclose(found[1], np.add.reduceat(worth * values, marks) / total)
+    assert_allclose(found[2], total**-0.5)
+    assert_allclose(found[3], np.add.reduceat(power, marks))
+
+
+def test_the_reason_of_an_order_names_the_next_best_where_there_is_one():
+    of = [OrderScore(n, n, 10.0 * n, 100, c, 0.0) for n, c in ((1, 50.0), (2, 30.0), (3, 45.0))]
+    assert axis._reason(of[1], of).endswith(
+        "(1 is what a true model leaves; what no order explains counts as noise); order 3 is worse by 15"
+    )
+    assert axis._reason(of[1], of).startswith("order 2 has the least criterion, 30 (chi-square")
+    assert axis._reason(of[1], of[1:2]).endswith(
+        "by order: 2: 0.2 (1 is what a true model leaves; what no order explains counts as noise)"
+    )
 
 
 def swept(seconds=0.6, lowest=2.0, highest=2000.0, size=0.25):

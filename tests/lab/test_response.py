@@ -241,8 +241,9 @@ def test_bands_that_do_not_exist():
     u = chirp(0.05, 100.0, 3000.0)
     with pytest.raises(IdentificationError, match="resolves 20 Hz, which leaves fewer than 8 lines; record longer"):
         response_from_records([recording(u, u)], band_hz=(100.0, 200.0))
-    with pytest.raises(IdentificationError, match="band 200 to 100 Hz is empty"):
-        response_from_records([recording(u, u)], band_hz=(200.0, 100.0))
+    for low, high in ((200.0, 100.0), (100.0, 100.0), (0.0, 100.0), (-1.0, 100.0), (1.0, np.inf)):
+        with pytest.raises(IdentificationError, match=re.escape(f"band {low:g} to {high:g} Hz is empty; give a lower")):
+            response_from_records([recording(u, u)], band_hz=(low, high))
 
 
 def test_periods_that_do_not_fit():

@@ -880,14 +880,33 @@ def test_a_joint_bouc_wen_model_is_admissible_up_to_a_thousandth_of_its_gain(sig
     assert fit.falling is (sign < 0)
 
 
-@pytest.mark.parametrize(("samples", "named"), [(1000, True), (999, False)])
-def test_creep_asks_for_a_second(samples, named):
-    drive = np.sin(np.arange(samples) * 0.1)
-    records = [SimpleNamespace(drive_v=drive, step_s=1e-3)]
-    models = ["prandtl_ishlinskii", "prandtl_ishlinskii_creep"]
+@pytest.mark.parametrize(
+    ("lengths", "step_s", "supported"),
+    [
+        ((1000,), 1e-3, True),
+        ((999,), 1e-3, False),
+        ((100, 1000), 1e-3, True),  # the longest counts
+        ((1000,), 0.05, True),  # two decades: 1 s and 10 s
+        ((100,), 0.2, False),  # 10 s alone
+    ],
+)
+def test_creep_asks_for_a_second_and_two_decades(lengths, step_s, supported):
+    records = [SimpleNamespace(drive_v=np.zeros(samples), step_s=step_s) for samples in lengths]
+    models = ["prandtl_ishlinskii", "prandtl_ishlinskii_rate", "prandtl_ishlinskii_creep"]
     names, refused = candidates.supported_models(models, records, has_linear=False)
-    assert names == models[: 1 + named]
-    assert [each.model for each in refused] == models[1 + named :]
+    assert names == models[: 2 + supported]
+    assert [(each.model, "and creep shows over seconds" in each.reason) for each in refused] == [
+        (model, True) for model in models[2 + supported :]
+    ]
+
+
+@pytest.mark.parametrize("has_linear", [True, False])
+def test_a_cascade_asks_for_a_linear_part(has_linear):
+    records = [SimpleNamespace(drive_v=np.zeros(500), step_s=1e-3)]
+    models = ["prandtl_ishlinskii_joint", "bouc_wen", "linear"]
+    names, refused = candidates.supported_models(models, records, has_linear=has_linear)
+    assert names == (models if has_linear else ["bouc_wen"])
+    assert [each.model for each in refused] == ([] if has_linear else [models[0], models[2]])
 
 
 def test_poles_of_a_response_are_known_as_it_knows_them_and_no_better():

@@ -975,6 +975,55 @@ def test_other_arguments_that_cannot_be(training, known):
         predicted_error(known[0], replace(training[0], output=training[0].output[:, :1]))
 
 
+def small(size, inputs=1, periods=2, noise=0.0, name="r"):
+    """A record of periods of 8 samples, with outputs of two sizes."""
+    drive = size * np.tile(philox(2).standard_normal((8, inputs)), (periods, 1))
+    output = drive[:, :1] * [1.0, 3.0]
+    output[8:16] += noise
+    return Recording(name, "", drive, output, 100.0, tuple(f"u{k}" for k in range(inputs)), ("y", "z"), 8)
+
+
+@pytest.mark.parametrize(("inputs", "counts"), [(1, (1, 1)), (2, (2, 2)), (1, (1, 3)), (2, (4, 2))])
+def test_an_amplitude_with_no_more_records_than_inputs_counts_by_its_outputs(inputs, counts):
+    """The mean of the squares of its own class, for all classes."""
+    records = [small(10.0**c * (1.0 + 0.01 * k), inputs) for c, count in enumerate(counts) for k in range(count)]
+    classes = [c for c, count in enumerate(counts) for _ in range(count)]
+    squares = np.array([np.mean(np.var(r.output, axis=0)) for r in records])
+    of_class = [np.mean(squares[np.array(classes) == c]) for c in range(2)]
+    np.testing.assert_allclose(_expected_squares(records, classes, 0), np.array(of_class)[classes], rtol=1e-12)
+
+
+def test_the_noise_of_a_mean_of_periods_is_known_from_two_on():
+    """Two periods that differ by 2 at each sample: a variance of 2 each, and half of that in their mean."""
+    assert fit_of._noise_square(small(1.0, noise=2.0), 0) == pytest.approx(1.0)
+    assert fit_of._noise_square(small(1.0, periods=3, noise=2.0), 1) == pytest.approx(1.0)
+    assert fit_of._noise_square(small(1.0, noise=2.0), 1) == 0.0
+    assert fit_of._noise_square(small(1.0, periods=1), 0) == 0.0
+
+
+def test_records_need_a_period_behind_those_that_are_skipped_and_a_step_a_sample():
+    alike = [small(1.0), small(2.0)]
+    fit_of._check(alike, 1, StiffnessOptions(sub_steps=1, springs=1))
+    for skip in (2, 3):
+        with pytest.raises(
+            IdentificationError, match=f"^r: the record has 2 whole periods and {skip} are to be skipped"
+        ):
+            fit_of._check(alike, skip, StiffnessOptions())
+    with pytest.raises(IdentificationError, match="0 whole periods and -1 are to be skipped"):
+        fit_of._check([replace(small(1.0), period_samples=17)], -1, StiffnessOptions())
+
+
+def test_amplitudes_are_of_one_class_as_long_as_each_is_near_the_next():
+    records = [small(size, name=f"{size}") for size in (2.0, 1.05, 1.0, 1.12, 2.15, 1.22)]
+    amplitudes, classes = amplitude_classes(records)
+    assert classes == (1, 0, 0, 0, 1, 0)
+    unit = np.std(records[2].drive)
+    np.testing.assert_allclose(amplitudes, [unit * (1.05 + 1.0 + 1.12 + 1.22) / 4, unit * (2.0 + 2.15) / 2])
+    assert amplitude_classes(records[2:3]) == ((pytest.approx(unit),), (0,))
+    with pytest.raises(IdentificationError, match=r"^0: the drive does not change; excite the mirror"):
+        amplitude_classes([records[0], small(0, name="0")])
+
+
 def test_an_operator_that_goes_on_is_the_same_within_its_old_reach():
     play = PrandtlIshlinskii((0.0, 1.0), (2e-6, 1e-6), reach_v=3.0, polynomial_rad=(4e-6, 2e-6, 1e-6))
     further = _further(play, 7.5)

@@ -141,6 +141,7 @@ def test_a_split_behind_the_middle_is_told_and_so_is_a_part_of_the_range():
     ]
     assert "sweeps 0 V to 0.005 V of the 0 V to 0.01 V" in told(late, 2499, 1e-3)[0]
     assert told(late, 3000) == []  # as it was asked for
+    assert told([0, *[8.9] * 1999, *[10] * 2000], 2001) == []  # a sample behind the middle is no other split
     assert told(late, 4000) == []  # nothing is held out
     nine_tenths = [0, *[9] * 1999, *[10] * 2000]
     assert told(nine_tenths, 2000) == told(nine_tenths, 1000) == []

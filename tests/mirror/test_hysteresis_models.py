@@ -246,6 +246,9 @@ NO_NUMBERS = {
     "a weight of nothing at 0": lambda: replace(PLAYS, weights_rad_v=(1e-320, 6e-6, 4e-6)).inverse(1e-6 * DRIVE, STEP),
     "a weight beyond all": lambda: replace(PLAYS, weights_rad_v=(1e300, 6e-6, 4e-6)).response(DRIVE, STEP),
     "a growth beyond all": lambda: replace(BOUC_WEN, delta_s_v=1.0, rate_limit_v_s=np.inf).response(DRIVE, 1e-9),
+    "a limit that is none": lambda: replace(BOUC_WEN, rate_limit_v_s=np.nan).response(DRIVE, STEP),
+    "a limit below all": lambda: replace(PLAYS, reach_v=-np.inf).response(DRIVE, STEP),
+    "a threshold beyond all": lambda: replace(PLAYS, thresholds_v=(0.0, 1.0, np.inf)).response(DRIVE, STEP),
     "a time constant of 0": lambda: Creep((1e-6,), (0.0,)).response(DRIVE, STEP),
     "fewer time constants than weights": lambda: Creep((1e-6, 1e-6), (0.1,)).response(DRIVE, STEP),
     "a complex drive": lambda: PLAYS.response(DRIVE + 0j, STEP),
@@ -261,6 +264,15 @@ def test_what_makes_no_numbers_is_refused_without_a_warning(call):
     with pytest.raises(ValueError, match=r"give|look for|beyond|no inverse") as caught:
         call()
     assert "\n" not in str(caught.value)
+
+
+def test_the_first_sample_without_a_number_is_named():
+    """At 1000 V/s, where exp(delta |rate|) is beyond all numbers."""
+    steep = replace(BOUC_WEN, delta_s_v=1.0, rate_limit_v_s=np.inf)
+    with pytest.raises(
+        ValueError, match=r"^the model gives no number at sample 2: look for a parameter or a rate that"
+    ):
+        steep.response([0.0, 0.01, 1.01, 1.02, 1.03], 1e-3)
 
 
 def test_whole_parameters_compile_nothing_of_their_own():

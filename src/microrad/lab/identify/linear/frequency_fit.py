@@ -490,7 +490,7 @@ def _misfit(per: float) -> tuple[str, ...]:
 def _uneven(response: Complexes, residual: Complexes) -> tuple[str, ...]:
     """Whether more is left where the response is large, in words: then the noise is not alike."""
     large = np.abs(response) > np.median(np.abs(response))
-    if not large.any() or large.all():
+    if not large.any():
         return ()
     above, below = (float(np.sqrt(np.mean(np.abs(residual[part]) ** 2))) for part in (large, ~large))
     if above <= _UNEVEN * below or above <= _ROUNDING * float(np.abs(response).max()):

@@ -47,7 +47,7 @@ def split_points(recordings: Sequence[Recording], hold_out: float | None, *, val
 def _behind_its_range(drive: Floats, split: int) -> int:
     """The split, or where the drive has swept its range if that comes later and leaves enough to judge by."""
     swept = np.maximum.accumulate(drive) - np.minimum.accumulate(drive)
-    if split == drive.size or swept[split - 1] >= _COVERED * swept[-1]:
+    if swept[split - 1] >= _COVERED * swept[-1]:
         return split
     later = int(np.argmax(swept >= _SWEPT * swept[-1])) + 1
     return later if drive.size - later >= max(_MIN_PART, _LEAST * drive.size) else split
