@@ -396,8 +396,9 @@ def test_lvm_whose_header_states_no_step_needs_a_rate_or_a_time(tmp_path, tag):
 @pytest.mark.parametrize("tag", ["Date", "Time"])
 def test_lvm_segments_without_a_clock_or_of_another_step_are_not_joined(tmp_path, tag):
     path = lvm(tmp_path / "a.lvm", segments=2)
-    first, second = path.read_bytes().replace(f"{tag}\t".encode(), b"Other\t"), path.read_bytes()
-    for text in (first, second.replace(b"5.0E-4\t5.0E-4", b"2.0E-4\t2.0E-4", 1)):
+    whole = path.read_bytes()
+    before, _, behind = whole.rpartition(b"5.0E-4\t5.0E-4")
+    for text in (whole.replace(f"{tag}\t".encode(), b"Other\t"), before + b"2.0E-4\t2.0E-4" + behind):
         path.write_bytes(text)
         assert LvmSource(path).names == ("0/drive", "0/output", "1/drive", "1/output")
 
@@ -593,6 +594,18 @@ def test_truncated_matlab(tmp_path, kept, missing):
     message = refusal(path, "drive", "output", RATE_HZ)
     assert f"an element is cut off, {missing} bytes of it are missing" in message
     assert "the file is damaged or truncated: copy it again" in message
+
+
+def test_a_structure_of_matlab_without_fields_is_no_channel(tmp_path):
+    def element(kind, data):
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE})
+    head = element(6, struct.pack("<II", 2, 0)) + element(5, struct.pack("<ii", 1, 1)) + element(1, b"bare")
+    bare = element(14, head + element(5, struct.pack("<i", 1)) + element(1, b""))
+    path.write_bytes(path.read_bytes() + bare)
+    assert "'bare' is a structure without fields; name another variable" in refusal(path, "drive", "bare", RATE_HZ)
 
 
 def test_damaged_matlab_names_the_variable(tmp_path):
