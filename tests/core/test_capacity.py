@@ -9,7 +9,8 @@ from scipy import integrate, optimize, stats
 
 from link_files import RECEIVERS, link_file, received_with
 from microrad import link
-from microrad.core.capacity import Code, untold_of_a_sign
+from microrad.core.capacity import Code, _OnOff, untold_of_a_sign
+from microrad.core.capacity import entropy as binary_entropy
 from microrad.link import receivers
 from microrad.mission.toml import MissionError
 
@@ -177,3 +178,17 @@ def test_the_gain_against_shot_noise_is_in_proportion_to_its_excess():
     one, two, five = (Code(0.5, 1e-9).ook_current(2.0, 0.0, excess) for excess in (1.0, 2.0, 5.0))
     assert two > one
     assert five - one == pytest.approx(4.0 * (two - one), rel=1e-9)
+
+
+@pytest.mark.parametrize(("share", "bits"), [(0.0, 0.0), (1.0, 0.0), (0.5, 1.0), (0.11, 0.499916), (0.89, 0.499916)])
+def test_a_share_of_none_or_all_holds_no_bit_and_one_of_a_half_a_whole_one(share, bits):
+    assert binary_entropy(share) == pytest.approx(bits, abs=1e-6)
+
+
+def test_counts_that_no_signal_tells_apart_have_no_exponent():
+    """Where the background swallows the signal, too, down to the last digit."""
+    line = _OnOff(2.0, 0.0)
+    assert line.exponent(0.0, 3.0) == 0.0
+    assert line.exponent(1e-20, 3.0) == 0.0
+    assert line.exponent(1.5, 0.0) == 3.0
+    assert 0.0 < line.exponent(1.5, 3.0) < 3.0

@@ -246,3 +246,17 @@ def test_others_may_read_and_enter_a_folder_of_results_and_not_change_it(tmp_pat
     with whole_folder(tmp_path / "results", False) as draft:
         assert draft.stat().st_mode & 0o777 == 0o700
     assert (tmp_path / "results").stat().st_mode & 0o777 == 0o755
+
+
+def test_an_error_without_a_text_of_the_systems_keeps_its_own(tmp_path):
+    with pytest.raises(OSError, match="the library says so") as caught, whole_folder(tmp_path / "results", False):
+        raise OSError("the library says so")
+    assert (caught.value.strerror, caught.value.filename) == ("the library says so", str(tmp_path / "results"))
+
+
+def test_nothing_is_taken_for_left_behind_where_no_process_can_be_asked_for(tmp_path, monkeypatch):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (tmp_path / "folder").mkdir()
+    monkeypatch.setattr(folder.os, "name", "nt")
+    assert not folder._left_behind(tmp_path / "folder", gone.pid)

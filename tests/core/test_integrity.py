@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import subprocess
+from types import SimpleNamespace
 
 import pytest
 
@@ -113,3 +114,36 @@ def test_versions_are_those_that_differ_from_the_tested_ones(tmp_path, monkeypat
     assert integrity.other_versions() == {"scipy": "scipy 1.1 (tested: 1.2)"} and integrity.from_source()
     first.write_text("numpy==2.1\n", encoding="utf-8")
     assert integrity.other_versions() == {"numpy": "numpy 2.0 (tested: 2.1)"}
+
+
+class Recorded:
+    """A line of a wheel's record, as the library for metadata gives it."""
+
+    def __init__(self, path, digest, mode, root):
+        self.parts, self.place = tuple(path.split("/")), root / path
+        self.hash = digest and SimpleNamespace(mode=mode, value=digest)
+
+    def locate(self):
+        return self.place
+
+
+def test_of_a_record_the_digests_of_the_packages_own_files_count(tmp_path, monkeypatch):
+    lines = [
+        ("microrad/a.py", "1", "sha256", tmp_path),
+        ("microrad/core/b.py", "2", "sha256", tmp_path),
+        ("microrad/old.py", "3", "md5", tmp_path),
+        ("microrad/none.py", None, "", tmp_path),
+        ("microrad-1.dist-info/METADATA", "4", "sha256", tmp_path),
+        ("microrad/elsewhere.py", "5", "sha256", tmp_path / "another"),  # of another copy than the one that runs
+    ]
+    monkeypatch.setattr(integrity, "_PACKAGE", tmp_path / "microrad")
+    monkeypatch.setattr(integrity.metadata, "files", lambda name: [Recorded(*line) for line in lines])
+    assert integrity._recorded() == {"a.py": "1", "core/b.py": "2"}
+    monkeypatch.setattr(integrity.metadata, "files", lambda name: None)
+    assert integrity._recorded() == {}
+
+    def absent(name):
+        raise integrity.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(integrity.metadata, "files", absent)
+    assert integrity._recorded() == {}

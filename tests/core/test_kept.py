@@ -251,6 +251,26 @@ def test_a_folder_behind_a_link_of_another_user_is_not_used(tmp_path, entered):
     assert f"{link} is another user's" in Kept(place).trouble
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
+@pytest.mark.parametrize(("above", "trouble"), [(0, ""), (1, " is another user's: nothing is kept")])
+def test_folders_of_the_system_may_stand_above_the_users_and_those_of_others_may_not(
+    tmp_path, monkeypatch, above, trouble
+):
+    """As /home is: what the user has made is here that of the user 1000, and all above it that of another one."""
+    place = tmp_path / "cache" / "parts"
+
+    def owned(path, **_):
+        found = os.lstat(path)
+        by = 1000 if path.is_relative_to(tmp_path) else above
+        return os.stat_result((found.st_mode | 0o011, *found[1:4], by, *found[5:]))
+
+    monkeypatch.setattr(os, "getuid", lambda: 1000)
+    monkeypatch.setattr(kept.Path, "stat", owned)
+    monkeypatch.setattr(kept.Path, "lstat", owned)
+    assert trouble in Kept(place).trouble
+    assert bool(Kept(place).trouble) == bool(trouble)
+
+
 @pytest.mark.promise("report-5")
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
 def test_the_folders_that_are_made_are_private(tmp_path):
@@ -278,15 +298,22 @@ def test_parts_are_private(place):
     assert [p.stat().st_mode & 0o077 for p in (place, file.parent)] == [0, 0]
 
 
-def test_a_full_disk_ends_the_keeping_and_nothing_else(place, monkeypatch):
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "a"), os.strerror(errno.ENOSPC)),
+        (OSError("the library says so"), "the library says so"),  # without a number it has no text of the system's
+    ],
+)
+def test_a_full_disk_ends_the_keeping_and_nothing_else(place, monkeypatch, error, said):
     def full(path, content, **_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        raise error
 
     parts = Kept(place)
     monkeypatch.setattr(kept, "write_whole", full)
     for _ in range(2):
         assert parts.part(samples, ONE, 3).samples.size == 3
-    assert os.strerror(errno.ENOSPC) in parts.trouble
+    assert parts.trouble == f"{place}: {said}: nothing is kept for a quicker next run"
     assert not files(place)
 
 
@@ -301,6 +328,24 @@ def test_the_folder_stays_within_its_size(place):
     assert CALLS == []  # the latest one is still there
     Kept(place).part(samples, Inputs(0.0), 1000)
     assert CALLS == [0.0]
+
+
+@pytest.mark.parametrize(("beyond", "left"), [(0, 2), (1, 1)])
+def test_the_folder_may_be_as_large_as_it_may_be_and_no_larger(place, beyond, left):
+    Kept(place).part(samples, ONE, 3)
+    (one,) = files(place)
+    Kept(place, most_bytes=2 * one.stat().st_size - beyond).part(samples, replace(ONE, gain=3.0), 3)
+    assert len(files(place)) == left
+    assert one.exists() == (left == 2)  # the one that was used last stays
+
+
+def test_the_empty_folder_of_a_part_goes_once_it_is_old(place):
+    Kept(place)
+    for name, age_s in (("old", kept.LONGEST_EMPTY_S + 5.0), ("new", kept.LONGEST_EMPTY_S - 50.0)):
+        (place / name).mkdir()
+        os.utime(place / name, (time.time() - age_s,) * 2)
+    Kept(place).part(samples, ONE, 3)
+    assert not (place / "old").exists() and (place / "new").exists()
 
 
 def test_only_the_latest_results_of_a_part_are_kept(place):
@@ -401,10 +446,15 @@ def test_what_else_stands_in_the_folder_is_left_alone(place):
     Kept(place).part(samples, ONE, 3)
     folder = files(place)[0].with_name("folder.part")
     folder.mkdir()
+    elsewhere = place.parent / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "a.part").write_text("of somebody else")
+    (place / "link").symlink_to(elsewhere)
     parts = Kept(place, most_bytes=1)
     parts.part(samples, Inputs(3.0), 3)
     assert parts.trouble == ""
     assert files(place) == [folder]
+    assert [path.name for path in elsewhere.iterdir()] == ["a.part"]
     assert [(place / name).read_text() for name in ("notes.txt", "mine/keep.txt")] == ["a file", "another"]
 
 
@@ -433,6 +483,15 @@ def test_a_user_without_a_home_has_nothing_kept(monkeypatch):
     for _ in range(2):
         kept.of_user().part(samples, ONE, 3)
     assert CALLS == [2.0, 2.0]
+
+
+@pytest.mark.parametrize("said", [None, ""])
+def test_without_a_folder_for_caches_parts_stand_in_the_users_home(monkeypatch, tmp_path, said):
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    if said is not None:
+        monkeypatch.setenv("XDG_CACHE_HOME", said)
+    monkeypatch.setattr(kept.Path, "home", lambda: tmp_path)
+    assert kept.folder_of_user() == tmp_path / ".cache" / "microrad" / "parts"
 
 
 @pytest.mark.promise("report-4", "report-5")

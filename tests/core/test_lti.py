@@ -352,3 +352,34 @@ def test_a_gramian_of_a_stack_is_that_of_each_and_of_the_transpose_a_covariance(
         assert_allclose(X, lti.gramian(A.T, noise), rtol=1e-12)
     nothing = np.zeros((0, 0))
     assert lti.gramian(nothing, nothing).shape == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "root"),
+    [
+        ([[4.0, 2.0], [2.0, 5.0]], [[2.0, 0.0], [1.0, 2.0]]),
+        ([[1.0, 1.0], [1.0, 1.0]], [[1.0, 0.0], [1.0, 0.0]]),  # the second adds nothing
+        ([[1.0, 1.0], [1.0, 1.0 + 4e-13]], [[1.0, 0.0], [1.0, 0.0]]),  # nor by what rounding may leave
+        ([[1.0, 1.0], [1.0, 1.0 + 4e-6]], [[1.0, 0.0], [1.0, 2e-3]]),
+        ([[0.0, 0.0], [0.0, 9.0]], [[0.0, 0.0], [0.0, 3.0]]),
+        ([[1e-20, 0.0], [0.0, 1e20]], [[1e-10, 0.0], [0.0, 1e10]]),  # small states keep their digits
+    ],
+)
+def test_the_root_of_a_covariance_is_lower_triangular_and_0_where_a_state_adds_nothing(matrix, root):
+    assert_allclose(lti.covariance_root(np.array(matrix)), root, rtol=1e-6, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("covariance", "variances", "axes"),
+    [
+        ([[2.0, 0.0], [0.0, 1.0]], [1.0, 2.0], [[0.0, 1.0], [1.0, 0.0]]),
+        ([[2.0, 1e-10], [1e-10, 2.0]], [2.0, 2.0], [[1.0, 0.0], [0.0, 1.0]]),  # as good as uncorrelated and equal
+        ([[0.0, 0.0], [0.0, 0.0]], [0.0, 0.0], [[1.0, 0.0], [0.0, 1.0]]),
+        ([[2.0, 1.0], [1.0, 2.0]], [1.0, 3.0], [[0.5**0.5, 0.5**0.5], [-(0.5**0.5), 0.5**0.5]]),
+        ([[2.0, -1.0], [-1.0, 2.0]], [1.0, 3.0], [[0.5**0.5, 0.5**0.5], [0.5**0.5, -(0.5**0.5)]]),
+    ],
+)
+def test_principal_axes_point_to_where_their_largest_entry_is_above_0(covariance, variances, axes):
+    found, directions = lti.principal_axes(np.array(covariance))
+    assert_allclose(found, variances, rtol=1e-9, atol=1e-15)
+    assert_allclose(directions, axes, rtol=1e-6, atol=1e-15)

@@ -261,6 +261,46 @@ def test_a_structure_without_fields_is_read(tmp_path):
     assert MatlabFile(write(tmp_path / "a.mat", "<", nameless), MOST_BYTES).variables["s"] == Structure(1, (), ())
 
 
+@pytest.mark.parametrize(("count", "left"), [(16, False), (17, True)])
+def test_short_arrays_are_read_with_the_list_and_longer_ones_left(tmp_path, count, left):
+    path = write(tmp_path / "a.mat", "<", matrix("<", 6, (count, 1), b"x", doubles("<", range(count))))
+    file = MatlabFile(path, MOST_BYTES)
+    assert isinstance(file.variables["x"], Left) == left
+    values = file.numbers(file.variables["x"]) if left else file.variables["x"]
+    np.testing.assert_array_equal(values[:, 0], np.arange(float(count)))
+
+
+def test_text_of_which_nothing_is_there_is_empty(tmp_path):
+    data = matrix("<", 4, (0, 0), b"nothing"), matrix("<", 4, (0, 0), b"empty", element("<", 1, b""))
+    assert MatlabFile(write(tmp_path / "a.mat", "<", *data), MOST_BYTES, whole=True).variables == {
+        "nothing": "",
+        "empty": "",
+    }
+
+
+@pytest.mark.parametrize("fields", [3, 4])
+def test_a_structure_has_so_many_names_of_fields_and_no_more(tmp_path, monkeypatch, fields):
+    monkeypatch.setattr(reader, "MOST_ARRAYS", 3)
+    names = b"".join(f"f{k}".encode().ljust(8, b"\0") for k in range(fields))
+    data = matrix("<", 2, (0, 0), b"s", element("<", 5, struct.pack("<i", 8)), element("<", 1, names))
+    path = write(tmp_path / "a.mat", "<", data)
+    if fields == 3:
+        assert MatlabFile(path, MOST_BYTES).variables["s"] == Structure(0, ("f0", "f1", "f2"), ())
+    else:
+        why, remedy = refused(path)
+        assert "it holds more than 3 arrays" in why and remedy == "save the arrays that are needed alone"
+
+
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_packed_data_may_fill_what_they_may_unpack_to(tmp_path, beyond):
+    data = matrix("<", 6, (200, 1), b"x", doubles("<", np.arange(200.0)))
+    path = write(tmp_path / "a.mat", "<", data, compressed=True)
+    if beyond:
+        assert "unpacks to more than" in refused(path, most_bytes=len(data) - 1, whole=True)[0]
+    else:
+        assert MatlabFile(path, len(data), whole=True).variables["x"].shape == (200, 1)
+
+
 def test_a_file_that_gets_shorter_is_refused_when_its_numbers_are_read(tmp_path):
     values = np.arange(200.0)
     path = write(tmp_path / "a.mat", "<", matrix("<", 6, (200, 1), b"x", doubles("<", values)))

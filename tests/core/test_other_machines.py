@@ -135,3 +135,12 @@ def test_last_digits_of_arrays_and_of_hysteresis_are_those_of_a_kind_of_processo
     assert other_arrays != arrays and other_arrays == pytest.approx(arrays, rel=1e-14)
     _, other_hysteresis = digits(**_LESS_OF_THE_COMPILER)
     assert other_hysteresis != hysteresis and other_hysteresis == pytest.approx(hysteresis, rel=1e-9, abs=1e-18)
+
+
+@pytest.mark.parametrize(
+    ("found", "told"), [(("glibc", "2.35"), "glibc 2.35"), (("musl", ""), "musl"), (("", ""), "Some-System-1")]
+)
+def test_a_machine_is_named_by_its_c_library_or_else_by_its_system(monkeypatch, found, told):
+    monkeypatch.setattr(machine.platform, "libc_ver", lambda: found)
+    monkeypatch.setattr(machine.platform, "platform", lambda terse: "Some-System-1" if terse else "long")
+    assert machine.machine()["C library"] == told

@@ -92,3 +92,19 @@ def test_a_phase_error_that_nobody_could_see_needs_as_much_as_none(rms_rad, rati
     assert phase_error.amplitude_for(ratio, rms_rad, quadratures) == pytest.approx(
         clean, rel=clean**2 * rms_rad**2 + 1e-11
     )
+
+
+@pytest.mark.parametrize(("quadratures", "rms_rad"), [(1, 0.5), (2, 0.3)])
+def test_a_ratio_at_the_floor_is_reached_by_no_power(quadratures, rms_rad):
+    floor = phase_error.floor(rms_rad, quadratures)
+    assert math.isinf(phase_error.amplitude_for(floor, rms_rad, quadratures))
+    assert math.isfinite(phase_error.amplitude_for(1.001 * floor, rms_rad, quadratures))
+    assert phase_error.floor(0.0, quadratures) == 0.0
+
+
+@pytest.mark.parametrize("quadratures", [1, 2])
+def test_ratios_have_the_shape_of_the_amplitudes(quadratures):
+    for rms_rad in (0.0, 0.1):
+        for amplitude in (np.zeros((0,)), np.ones((2, 3)), np.ones(300), np.asarray(2.0)):
+            assert phase_error.bit_error_ratio(amplitude, rms_rad, quadratures).shape == amplitude.shape
+    assert phase_error.bit_error_ratio(np.zeros(1), 0.1, quadratures) == pytest.approx([0.5], rel=1e-9)

@@ -61,6 +61,11 @@ def test_without_background_it_is_the_erasure_channel(order):
     assert little == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("background", [0.0, 0.5])
+def test_no_pulse_tells_nothing(background):
+    assert soft_bits(16, 0.0, background) == 0.0
+
+
 @pytest.mark.promise("link-91")
 @pytest.mark.parametrize(
     ("order", "rate", "bits_per_photon"), [(16, 0.5, 2.885), (64, 1 / 3, 4.933), (128, 0.5, 5.049)]

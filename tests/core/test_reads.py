@@ -186,6 +186,29 @@ def test_another_process_finds_the_same_digests():
     assert found == {digest({"a": (1.5, {"x", "y", "z"}), "b": None}).hex() + "\n"}
 
 
+@dataclass(frozen=True)
+class Nothing:
+    pass
+
+
+@dataclass(frozen=True)
+class NothingElse:
+    pass
+
+
+@dataclass(frozen=True)
+class Told:
+    number: float
+
+    def __reduce__(self):
+        return Told, (round(self.number),)
+
+
+def test_a_record_without_fields_is_known_by_its_kind_and_one_that_tells_by_what_it_tells():
+    assert digest(Nothing()) == digest(Nothing()) != digest(NothingElse())
+    assert digest(Told(1.1)) == digest(Told(0.9)) != digest(Told(2.1))
+
+
 def holds_a_value():
     inside = 3.0
     return lambda: inside

@@ -186,3 +186,22 @@ def test_no_job_is_done_aside_while_other_threads_run():
     with ThreadPoolExecutor(1) as pool:
         pool.submit(in_background, lambda: done.append(1)).result()()
     assert done == []
+
+
+@pytest.mark.parametrize("cores", [1, None])
+def test_nothing_is_forked_on_a_single_core_or_one_that_is_not_known(monkeypatch, cores):
+    done = []
+    monkeypatch.setattr(threads, "_may_fork", lambda: True)
+    monkeypatch.setattr(threads.os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(threads.multiprocessing, "get_context", lambda kind: kind)  # nothing could start a process
+    in_background(lambda: done.append(1))()
+    assert done == []
+    with shared_out([lambda: 1, lambda: 2]) as results:
+        assert results() == [1, 2]
+    assert in_threads([lambda: 1, lambda: 2]) == [1, 2]
+
+
+@pytest.mark.parametrize("platform", ["darwin", "win32"])
+def test_nothing_is_forked_on_another_system(monkeypatch, platform):
+    monkeypatch.setattr(threads.sys, "platform", platform)
+    assert not threads._may_fork()

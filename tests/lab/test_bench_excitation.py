@@ -12,6 +12,7 @@ from microrad.lab.bench.excitation import (
     growing_sines,
     logarithmic_chirp,
     multisine,
+    samples_in,
     staircase,
 )
 
@@ -202,17 +203,37 @@ def tones(limits=LIMITS, *, lines=None, **changes):
         (lambda: chirp(offset_v=13.0), r"offset has 13 V, outside .*; would fit: 0 V to 12 V"),
         (lambda: chirp(duration_s=1e5), r"duration makes a record of 100000 s at 10 kHz; would fit: at most 2000 s"),
         (lambda: chirp(axis=1), r"axis is 2, but the bench has 1 input; would fit: 1 to 1"),
+        (lambda: chirp(two_inputs(), axis=2), r"axis is 3, but the bench has 2 inputs; would fit: 1 to 2"),
+        (lambda: chirp(axis=-1), r"axis is 0, but the bench has 1 input; would fit: 1 to 1"),
+        (lambda: chirp(offset_v=12.0), r"amplitude takes the drive to 13 V, .*; would fit: at most 0 V$"),
+        (lambda: chirp(offset_v=6.0006, amplitude_v=7.0), r"limits.drive_max is 12 V; would fit: at most 5.999 V"),
+        (lambda: chirp(offset_v=-1.0), r"^chirp: offset has -1 V, outside [^;]*; would fit: 0 V to 12 V$"),
         (lambda: sines(amplitudes_v=[1.0, 6.5]), r"amplitudes takes the drive to 12.5 V, .*at most 6 V"),
         (lambda: sines(freq_hz=70.0), r"periods of 70 Hz: 2 of them fill 285.714 samples, no .*: a multiple of 7, or"),
         (lambda: sines(freq_hz=70.0), r"or a frequency of 69.93006\d+ Hz"),
+        (
+            lambda: sines(freq_hz=20 * math.pi),
+            r"2 of them fill 318.31 samples, no whole .* fit: a frequency of 62.89\d+",
+        ),
+        (
+            lambda: sines(freq_hz=1e12, periods=1),
+            r"1 of them fill 1e-08 samples, no whole .* fit: a frequency of 10 kHz$",
+        ),
+        (lambda: sines(periods=60_000), r"periods makes a record of 2400 s at 10 kHz; would fit: at most 2000 s"),
         (lambda: sines(freq_hz=2000.0, periods=1), r"frequencies reaches 2 kHz, 5 samples a period"),
         (lambda: steps(rise_s=1e-4), r"rise makes the largest step one of 120 kV/s, limits.slew is 20 kV/s; .* 600 µs"),
         (lambda: steps(levels_v=[12.0, 0.0], rise_s=1e-4), r"rise makes the largest step one of 120 kV/s, .* 600 µs"),
         (lambda: steps(levels_v=[0.0, 13.0]), r"levels has 13 V, outside limits.drive_min to limits.drive_max"),
         (lambda: steps(levels_v=[1.0]), r"levels has one item, which is no step; would fit: at least two levels"),
+        (lambda: steps(rise_s=1001.0), r"rise makes a record of 2002 s at 10 kHz; would fit: at most 2000 s"),
+        (lambda: steps(dwell_s=1200.0), r"dwell makes a record of 2400 s at 10 kHz; would fit: at most 2000 s"),
         (lambda: steps(dwell_s=1e-6), r"dwell is shorter than half a sample; would fit: at least 100 µs"),
         (lambda: tones(rms_v=4.0), r"rms takes the drive to 1\d\.?\d* V, limits.drive_max is 12 V; would fit: at most"),
         (lambda: tones(lines=Lines(0.20003, 10, 400)), r"period is 2000.3 samples, no whole number .*: 200 ms"),
+        (lambda: tones(lines=Lines(1e-4, 10, 400)), r"period is 1 samples, no whole number of at least 2; .*: 200 µs"),
+        (lambda: tones(lines=Lines(2e-4, 10, 5000)), r"stop reaches 5 kHz, 2 samples a period"),
+        (lambda: tones(lines=Lines(0.2, 11, 14, "odd")), r"stop leaves no odd line of a multisine with one every 5 Hz"),
+        (lambda: tones(periods=11_000), r"periods makes a record of 2200 s at 10 kHz; .* at most 2000 s"),
         (lambda: tones(lines=Lines(0.2, 11, 14)), r"stop leaves no all line of a multisine with one every 5 Hz"),
         (lambda: tones(lines=Lines(0.2, 10, 5000)), r"stop reaches 5 kHz, 2 samples a period"),
         (lambda: tones(realisations=6000), r"realisations makes a record of 2400 s at 10 kHz; .* at most 2000 s"),
@@ -222,6 +243,49 @@ def tones(limits=LIMITS, *, lines=None, **changes):
 def test_a_design_beyond_a_limit_is_refused_with_what_would_fit(design, message):
     with pytest.raises(DesignError, match=message):
         design()
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        lambda: chirp(stop_hz=1000.0),  # ten samples a period
+        lambda: chirp(stop_hz=100.0, amplitude_v=6.0),  # from 0 to 12 V
+        lambda: chirp(stop_hz=2.0, duration_s=0.1, offset_v=0.0),  # it has gone up alone
+        lambda: steps(levels_v=[0.0, 12.0 + 1e-8]),  # what rounding may leave
+        lambda: steps(levels_v=[0.0 - 1e-8, 12.0]),
+        lambda: steps(rise_s=600e-6),
+        lambda: tones(two_inputs(), realisations=2, periods=1),
+    ],
+)
+def test_a_limit_that_is_just_met_is_kept(design):
+    assert design()
+
+
+@pytest.mark.parametrize("levels_v", [[0.0, 12.0 + 2e-8], [-2e-8, 12.0]])
+def test_a_level_beyond_what_rounding_leaves_is_refused(levels_v):
+    with pytest.raises(DesignError, match=r"outside limits.drive_min to limits.drive_max; would fit: 0 V to 12 V"):
+        steps(levels_v=levels_v)
+
+
+def test_a_record_may_have_as_many_samples_as_it_may_over_all_inputs():
+    assert samples_in(LIMITS, "a", "duration", 2000.0) == 20_000_000
+    assert samples_in(two_inputs(), "a", "duration", 1000.0) == 10_000_000
+    assert samples_in(LIMITS, "a", "duration", 1e-9) == 1
+    with pytest.raises(
+        DesignError, match=r"a: duration makes .* 1001 s .* at most 1000 s \(20 million samples\), or a lo"
+    ):
+        samples_in(two_inputs(), "a", "duration", 1001.0)
+
+
+def test_the_shortest_staircase_has_a_sample_at_each_level_and_one_step_between_them():
+    made = steps(levels_v=[0.0, 1.0], dwell_s=1e-4, rise_s=1e-9)
+    assert made.drive[:, 0].tolist() == [0.0, 0.0, 1.0, 1.0]
+    assert made.step_samples == (2,)
+
+
+def test_a_multisine_begins_with_its_first_harmonic_however_low_its_band_begins():
+    (made,) = tones(lines=Lines(0.2, 1e-7, 10.0))
+    assert made.lines == (1, 2)
 
 
 def test_a_thousandth_of_a_period_is_enough_of_a_chirp():

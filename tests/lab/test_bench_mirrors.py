@@ -241,3 +241,13 @@ def test_rest_is_what_a_decaying_sine_leaves():
     extension = mirror.direct_mrad_v * drive[-1] + mirror.weights_mrad_v @ plays
     assert mirror.saturated(np.array(extension)) == pytest.approx(mirror.at_rest(7.0), rel=2e-3)
     assert mirror.at_rest(7.0) != pytest.approx(mirror.at_rest(7.1), rel=2e-3)
+
+
+def test_another_mirror_may_stand_in_the_place_of_the_benchs_own():
+    """Without plays, saturation, lag and creep a step of 1 V is answered with the direct part alone, once it rings."""
+    plain = BenchMirror(play_mrad_v=0.0, curvature_1_mrad=0.0, creep_share_decade=0.0)
+    drive = np.repeat([6.0, 7.0], [5, 400])
+    output = bench_output(drive, 6.0, RATE_HZ, AMPLIFIER, plain)
+    assert output[0] == pytest.approx(6.0 * 0.079, rel=1e-9)
+    assert output[-1] == pytest.approx(7.0 * 0.079, rel=1e-3)
+    assert bench_output(drive, 6.0, RATE_HZ, AMPLIFIER)[0] == pytest.approx(BenchMirror().at_rest(6.0), rel=1e-9)

@@ -203,8 +203,12 @@ def test_a_plan_can_be_cut_down():
         ('^output_min = "-?[^"]*mrad"', 'output_min = "9 mrad"', "bench.converters.output_max", "not above output_min"),
         ('^drive_max = "16 V"', 'drive_max = "-4 V"', "bench.converters.drive_max", "drive_min.*\n.*above -4 V"),
         ('^drive_max = "12 V"', 'drive_max = "-1 V"', "limits.drive_max", "is not above drive_min"),
+        ('^drive_max = "12 V"', 'drive_max = "0 V"', "limits.drive_max", r"drive_min \(0 V\)\n.*a voltage above 0 V"),
         (r"^\[excitation.chirp\]", "[excitation.'a b']", "excitation.a b", "is no name that a file can have"),
+        (r"^\[excitation.chirp\]", "[excitation.'']", "excitation.", "is no name that a file can have"),
+        (r"^\[excitation.chirp\]", f"[excitation.{'a' * 61}]", f"excitation.{'a' * 61}", "is no name that a file can"),
         (r"^\[excitation.chirp\]", "[excitation.loop-60hz]", "excitation", 'two records named "loop-60hz"'),
+        (r"^\[excitation.chirp\]", "[excitation.Loop-60Hz]", "excitation", 'named "loop-60hz"\n.*names that stay diff'),
         (r"^\[excitation.chirp\]", "[excitations.chirp]", "excitations", "did you mean excitation"),
         (r'^offset = "6 V"  .*about.*', 'offset = "6 V', "excitation.chirp.offset", "is not TOML"),
     ],
@@ -299,14 +303,24 @@ def test_limits_are_held_against_the_excitations_also_when_something_else_is_wro
     assert {f.key for f in refuse(text).faults} == {"bench.converters.bits", "excitation.loop.periods"}
     text = changed('^slew = "20 V/ms"', 'slew = "20 V"', changed("^periods = 12", "periods = 10"))
     assert {f.key for f in refuse(text).faults} == {"limits.slew"}  # without limits there is nothing to hold against
+    text = changed('^truth = "bench"', 'axes = 5\ntruth = "bench"', changed("^periods = 12", "periods = 10"))
+    assert {f.key for f in refuse(text).faults} == {"bench.axes"}  # nor without a number of axes that there may be
 
 
-@pytest.mark.parametrize("ending", ["", "[[excitation]]\nkind = 'chirp'\n", "excitation = 5\n"])
-def test_a_plan_without_excitations_is_refused(refuse, ending):
+@pytest.mark.parametrize(
+    ("ending", "reason"),
+    [
+        ("", "is missing"),
+        ("[excitation]\n", "is not a group of named tables"),
+        ("[[excitation]]\nkind = 'chirp'\n", "is not a group of named tables"),
+        ("excitation = 5\n", "is not a group of named tables"),
+    ],
+)
+def test_a_plan_without_excitations_is_refused(refuse, ending, reason):
     head = TEXT.partition("[excitation.chirp]")[0]
     text = ending + head if ending.startswith("exc") else head + ending
     error = refuse(text)
-    assert "excitation" in {fault.key for fault in error.faults}
+    assert reason in {fault.reason for fault in error.faults if fault.key == "excitation"}
     assert "[excitation.NAME]" in str(error)
 
 
@@ -361,10 +375,24 @@ def test_records_that_would_fill_the_memory_are_refused_before_they_are_designed
     assert fault.key == "excitation.many.frequencies" and "makes a record of" in fault.reason
 
 
-def test_a_plan_has_so_many_samples_in_all(refuse, monkeypatch):
+def four_axes(tmp_path):
+    """The records of the paper's experiment on as many axes as there may be, its first excitation with a long name."""
+    text = changed('^truth = "bench"', 'axes = 4\ntruth = "bench"')
+    text = changed(r"^\[excitation.chirp\]", f"[excitation.{'a' * 60}]", text)
+    (tmp_path / "plan.toml").write_text(changed("^duration = .*", 'duration = "0.1 s"', text), encoding="utf-8")
+    return load_plan(tmp_path / "plan.toml").records
+
+
+def test_a_plan_has_so_many_samples_in_all(refuse, monkeypatch, tmp_path):
+    whole = sum(record.excitation.drive.size for record in four_axes(tmp_path))
     monkeypatch.setattr(plan, "_MOST_SAMPLES", 100_000)
     (fault,) = refuse(TEXT).faults
     assert fault.reason == "makes a plan of more than 0.1 million samples"
+    monkeypatch.setattr(plan, "_MOST_SAMPLES", whole)
+    assert len(four_axes(tmp_path)) == 4
+    monkeypatch.setattr(plan, "_MOST_SAMPLES", whole - 1)
+    with pytest.raises(PlanError, match=r"excitation\.loop\n +makes a plan of more than .* million samples"):
+        four_axes(tmp_path)
 
 
 def test_a_plan_may_have_as_many_excitations_as_it_may_and_no_more(monkeypatch):

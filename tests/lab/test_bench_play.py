@@ -17,7 +17,7 @@ from microrad.core.folder import FolderError
 from microrad.lab.bench import folder as bench_folder
 from microrad.lab.bench import load_plan, play, select_records, write_folder
 from microrad.lab.bench.plan import FORMATS, PlanError
-from microrad.lab.bench.play import BenchError, true_output
+from microrad.lab.bench.play import BenchError, _check_range, true_output
 
 SEED = 5
 
@@ -139,6 +139,21 @@ def test_an_output_beyond_its_converter_is_refused(short):
         play(plan, SEED)
     with pytest.raises(BenchError, match=r"take in 500 .rad to 2 mrad; widen output_min and output_max, or drive less"):
         play(with_sensor(short, converters_output_min_rad=5e-4), SEED)
+
+
+@pytest.mark.parametrize(
+    ("low_mrad", "high_mrad", "taken"), [(-1.0, 2.0, True), (-1.001, 2.0, False), (-1.0, 2.001, False)]
+)
+def test_an_output_may_fill_the_range_of_its_converter(short, low_mrad, high_mrad, taken):
+    plan = with_sensor(short, converters_output_min_rad=-1e-3, converters_output_max_rad=2e-3)
+    measured = np.array([[0.5], [low_mrad], [high_mrad]])
+    if taken:
+        _check_range(plan, plan.records[0], measured)
+        return
+    with pytest.raises(
+        BenchError, match=r"moves the mirror over -1(\.001)? mrad to 2(\.001)? mrad, but .* -1 mrad to 2 mrad"
+    ):
+        _check_range(plan, plan.records[0], measured)
 
 
 @pytest.mark.promise("bench-5", "bench-7", "bench-8", "bench-11")

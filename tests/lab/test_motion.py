@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.lab.recording import RecordingError, read_motion
+from microrad.lab.recording.reader import read_signal
 
 COUNT = 400
 TIME = np.arange(COUNT) / 500.0
@@ -44,6 +45,8 @@ def test_an_array_has_the_rate_and_the_unit_that_are_given(tmp_path):
         ("a (urad),b (urad),c (urad)", {}, "does not say how fast it was sampled; give the rate (--rate, rate_hz)"),
         ("time,x (urad),y (urad)", {"axes": ("x (urad)", "x (urad)")}, "2 channels ('x (urad)', 'x (urad)') as axes"),
         ("time,x (urad),y (urad)", {"axes": ("z",)}, "no axis"),
+        ("time,x (urad),y", {"axes": ("2",), "unit": "V"}, "('y') is in 'V', which is no angle; name channels of"),
+        ("time,Time (ms),sec", {}, "0 channels () as axes; name one to three that differ (--axes, axes)"),
     ],
 )
 def test_what_is_no_motion_of_the_line_of_sight_is_refused(tmp_path, heading, options, words):
@@ -72,3 +75,38 @@ def test_more_than_three_axes_gaps_and_samples_that_are_no_number_are_refused(tm
         read_motion(shaken)
     hardly = csv(tmp_path / "hardly.csv", "time,x (urad)", TIME + 3e-5 * np.sin(40 * np.arange(COUNT)), X)
     assert read_motion(hardly).rate_hz == pytest.approx(500.0, rel=1e-3)
+
+
+@pytest.mark.promise("pointing-64")
+@pytest.mark.parametrize("time", ["clock", 1])
+def test_a_time_that_is_named_is_no_axis(tmp_path, time):
+    path = csv(tmp_path / "jitter.csv", "x (urad),clock,y (urad),z (urad)", X, TIME, Y, X + Y)
+    motion = read_motion(path, time=time)
+    assert motion.names == ("x (urad)", "y (urad)", "z (urad)") and motion.rate_hz == pytest.approx(500.0, rel=1e-6)
+    assert read_motion(path, (3, 0), time=time).names == ("z (urad)", "x (urad)")
+
+
+@pytest.mark.promise("pointing-64")
+def test_the_name_of_an_array_says_its_unit_and_the_number_of_a_column_does_not(tmp_path):
+    np.savez(tmp_path / "a.npz", **{"x (arcsec)": X, "both": np.column_stack([X, Y])})
+    motion = read_motion(tmp_path / "a.npz", ("x (arcsec)",), 500.0)
+    assert_allclose(motion.samples_rad[:, 0], np.radians(X / 3600.0), rtol=1e-9, atol=1e-18)
+    with pytest.raises(RecordingError, match=r"\('both\[1\]'\): no unit is stated; give it"):
+        read_motion(tmp_path / "a.npz", ("both[1]",), 500.0)
+    motion = read_motion(tmp_path / "a.npz", ("both[1]", "both[0]"), 500.0, unit="urad")
+    assert_allclose(motion.samples_rad, 1e-6 * np.column_stack([Y, X]), rtol=1e-9, atol=1e-18)
+
+
+def test_one_of_several_channels_is_read_as_a_signal_by_its_name(tmp_path):
+    path = csv(tmp_path / "a.csv", "time,power (W),angle (urad)", TIME, X, Y)
+    for channel in ("angle (urad)", 2, "2"):
+        signal = read_signal(path, channel)
+        assert (signal.name, signal.unit, signal.rate_hz) == ("angle (urad)", "urad", pytest.approx(500.0))
+        assert_allclose(signal.samples, Y, atol=1e-11)
+    with pytest.raises(
+        RecordingError, match=r"the file has 2 channels beside its time \('time', 'power \(W\)', 'angle"
+    ):
+        read_signal(path)
+    alone = read_signal(csv(tmp_path / "b.csv", "power (W)", X))
+    assert (alone.name, alone.unit, alone.rate_hz) == ("power (W)", "W", None)
+    assert read_signal(csv(tmp_path / "b.csv", "power (W)", X), rate_hz=40.0).rate_hz == 40.0

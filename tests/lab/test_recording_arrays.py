@@ -222,6 +222,9 @@ def test_what_no_recordings_can_be_made_of(tmp_path):
     assert "4 arrays have 4 axes" in message
     assert "name it (--output). The file holds 'u' of shape (400, 2, 3, 2), 'y' of shape" in message
     assert "no one array of inputs is named 'v'; the file holds 'u'" in refusal(path, "v", "y")
+    message = refusal(path, axes=AXES[:3])
+    assert "no array has 3 axes, as --axes (axes) says, so which one holds the inputs is not plain: name it" in message
+    assert "(--input). The file holds 'u' of shape (400, 2, 3, 2), 'y' of shape" in message
     assert "leave out --period" in refusal(path, "u", "y", period_samples=200)
     assert "two sample rates" in refusal(path, "u", "y", rate_hz=500.0)
     np.savez(
@@ -231,9 +234,55 @@ def test_what_no_recordings_can_be_made_of(tmp_path):
     assert "realisation 0: sample 7 of period 1 of the output, y[0] is nan, 1 such samples" in message
     later = refusal(path, "u", "y", rate_hz=RATE_HZ, part_s=(0.1, None))  # the file's samples, not the part's
     assert "sample 7 of period 1 of the output, y[0] is nan" in later
+    np.savez(path, u=U[..., 0], y=np.where(np.arange(400) == 7, np.nan, 1.0)[:, None, None] * Y[..., 0])
+    message = refusal(path, "u", "y", axes=AXES[:3], rate_hz=RATE_HZ)
+    assert "realisation 0: sample 7 of the output, y[0] is nan, 1 such samples" in message
     text = tmp_path / "a.csv"
     text.write_text("u,y\n" + "1,2\n" * 300)
     assert "--axes (axes) is for arrays (NPY, NPZ, MAT, HDF5) and this file holds columns" in refusal(text, "u", "y")
+
+
+def test_a_file_whose_only_array_of_many_axes_is_empty_says_so(tmp_path):
+    np.savez(tmp_path / "a.npz", x=np.zeros((0, 3, 4)))
+    assert "no array has 3 axes" in refusal(tmp_path / "a.npz", axes=AXES[:3])
+    assert "The file holds 'x' holds no samples; record again" in refusal(tmp_path / "a.npz", axes=AXES[:3])
+
+
+@pytest.mark.parametrize("samples", [199, 200])
+def test_the_axis_of_samples_has_two_hundred_at_least(tmp_path, samples):
+    np.savez(tmp_path / "a.npz", u=U[:samples, :, 0, 0], y=Y[:samples, :, 0, 0], fs=RATE_HZ)
+    if samples == 200:
+        (read,) = read_arrays(tmp_path / "a.npz", "u", "y", axes=AXES[:2], period_samples=200)
+        assert (read.samples, read.period_samples, read.output.shape) == (200, 200, (200, 3))
+        (read,) = read_arrays(tmp_path / "a.npz", "u", "y", axes=AXES[:2], period_samples=2)
+        assert read.period_samples == 2
+        for period in (1, 201):
+            message = refusal(tmp_path / "a.npz", "u", "y", axes=AXES[:2], period_samples=period)
+            assert f"a period of {period} samples does not fit into 200 samples" in message
+    else:
+        message = refusal(tmp_path / "a.npz", "u", "y", axes=AXES[:2])
+        assert "the axis of 'u' that --axes (axes) calls samples has 199, and at least 200 are needed" in message
+
+
+@pytest.mark.parametrize(
+    ("part_s", "words"),
+    [
+        ((0.2, 0.2), "from 0.2 s to 0.2 s is no part of a recording of 0.8 s"),
+        ((0.3, 0.2), "from 0.3 s to 0.2 s is no part"),
+        ((0.8, None), "from 0.8 s to the end is no part"),
+        ((-0.1, 0.8), "from -0.1 s to 0.8 s is no part"),
+        ((0.0, 0.801), "from 0 s to 0.801 s is no part"),
+        ((0.0, 0.8), ""),
+        ((0.4, 0.8), ""),
+    ],
+)
+def test_a_part_lies_within_its_recording(tmp_path, part_s, words):
+    np.savez(tmp_path / "a.npz", u=U, y=Y, fs=RATE_HZ)
+    if words:
+        assert words in refusal(tmp_path / "a.npz", "u", "y", part_s=part_s)
+    else:
+        read = read_arrays(tmp_path / "a.npz", "u", "y", axes=AXES, part_s=part_s, accept=["drift", "unexcited"])
+        assert {each.samples for each in read} == {round((part_s[1] - part_s[0]) * RATE_HZ)}
 
 
 def test_an_array_of_a_name_that_stands_twice_is_named_in_full(tmp_path):

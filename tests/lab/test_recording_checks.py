@@ -15,8 +15,9 @@ from microrad.lab.recording import (
     recording_from_arrays,
 )
 from microrad.lab.recording.checks import sample_rate
-from microrad.lab.recording.checks.channel import _trend, drift
-from microrad.lab.recording.checks.sample_rate import rate_of_time
+from microrad.lab.recording.checks.channel import _percent, _trend, clipping, drift, quantum
+from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
+from microrad.lab.recording.formats.source import StatedRate
 from places import DATA
 
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not at {DATA}")
@@ -739,3 +740,109 @@ def test_what_the_digits_of_a_time_explain_is_no_scatter():
     assert [(kind, refused) for kind, _, refused in found] == [("jitter", True)] and "scatter by 12 % rms" in text
     coarse, text = steps_found(np.diff(np.floor(np.arange(2001) * 0.35)) * 1e-3, 1e-3)
     assert coarse == [("jitter", None, False)] and "printed to 0.001 s, coarser than the step of 0.00035 s" in text
+
+
+def test_the_time_of_a_file_of_single_precision_is_judged_by_its_digits():
+    """From 1000 s on they are 2^-14 s, of which a step has 16.2; of a time that is exact that would be scatter."""
+    time_s = (1000.0 + np.arange(N) * 16.2 / 2**14).astype(np.float32).astype(float)
+    stated, findings = rate_of_time("loops.csv", "time", time_s, lambda row: f"row {row}")
+    assert findings == [] and stated.rate_hz == pytest.approx(2**14 / 16.2, rel=1e-4)
+    exact = time_s + 1e-9 * (np.arange(N) == 2)  # no longer of single precision
+    assert [f.kind for f in rate_of_time("loops.csv", "time", exact, lambda row: f"row {row}")[1]] == ["jitter"]
+
+
+@pytest.mark.parametrize(
+    ("values", "step"),
+    [
+        ([2.0, 2.0, 2.0], 0.0),
+        ([1.0, 1.0 + 2e-16, 1.0], 0.0),  # rounding
+        ([0.0, 1.0], 1.0),
+        ([0.0, 0.25, 1.0, 0.75], 0.25),
+        ([0.0, 0.25, 0.6, 1.0], 0.0),  # no multiples
+        ([0.0, 1.0, 1e6], 1.0),
+        ([0.0, 1.0, 2e7], 0.0),  # too many steps to be those of a converter
+    ],
+)
+def test_a_step_of_quantisation_is_that_of_which_all_distances_are_multiples(values, step):
+    assert quantum(np.array(values)) == pytest.approx(step, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.00123, "0.12 %"), (0.5, "50 %"), (0.994, "99 %"), (0.996, "99.6 %"), (1.0, "100 %")]
+)
+def test_a_share_has_two_digits_and_three_near_all(share, text):
+    assert _percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("first", "samples", "width", "tops"),
+    [
+        (9, 45, 3, 2),
+        (8, 44, 3, 0),  # too near to the beginning to see its flank
+        (9, 41, 3, 2),
+        (9, 40, 3, 0),  # or to the end
+        (9, 45, 2, 0),  # too short
+        (9, 45, 5, 2),
+    ],
+)
+def test_a_flat_top_has_three_samples_and_its_flanks_within_the_record(first, samples, width, tops):
+    """A peak every 20 samples, cut off at so many of them."""
+    turn = 2 * np.pi * (np.arange(samples) - first - (width - 1) / 2) / 20
+    limit = np.cos(2 * np.pi * (width - 1) / 2 / 20) - 1e-9
+    found = clipping("the output", np.minimum(np.cos(turn), limit), lambda row: f"row {row}", [np.cos(turn)])
+    assert [(f.row, f.refused) for f in found] == ([(first, True)] if tops else [])
+    assert all(f"is clipped at {limit:.6g}: {tops} flat tops, the first at row {first}, " in f.message for f in found)
+
+
+@pytest.mark.parametrize("beside", [0, 1])
+def test_a_lead_as_behind_a_high_pass_is_noted_of_a_single_axis_alone(beside):
+    """Coupled axes have zeros, which look the same."""
+    one, other = multisine(1), multisine(2)
+    freq = np.fft.rfftfreq(N, 1 / RATE_HZ)
+    output = np.fft.irfft(np.fft.rfft(one + 0.01 * beside * other) * 1j * freq / (1j * freq + 1.0), N)
+    assert ("lead" in notes(np.column_stack((one, other)[: 1 + beside]), output)) == (not beside)
+
+
+def test_of_an_axis_that_rests_a_sensor_may_be_dead_or_coarse_and_not_clipped():
+    wave, still = multisine(1), np.zeros(N)
+    coarse = np.round(0.02 * wave / np.ptp(0.02 * wave) * 30) / 30  # thirty levels
+    found = one_of_several((wave, still), (wave + 0.01 * noise(), coarse), "some").findings
+    assert [(f.output, f.refused) for f in found if f.kind == "quantisation"] == [(1, False)]
+    with pytest.raises(RecordingError, match="the output 1 moves in steps of"):
+        recording_from_arrays(wave, np.column_stack((wave + 0.01 * noise(), coarse)), RATE_HZ)
+    with pytest.raises(RecordingError, match="the output 1 is clipped at"):
+        one_of_several((wave, still), (wave + 0.01 * noise(), np.clip(wave, -2.5, np.inf)), "some")
+
+
+@pytest.mark.parametrize("rate_hz", [1e-30, 1e30, 1, np.int32(50), np.float32(0.5)])
+def test_a_rate_that_is_a_number_of_some_size_is_taken(rate_hz):
+    assert check_rate("a.csv", rate_hz) == float(rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("given", "stated", "rate_hz"),
+    [
+        (1000.0, (1001.0,), 1000.0),
+        (1000.0, (999.0,), 1000.0),
+        (None, (1000.0, 1001.0), 1000.0),
+        (1000.0, (1001.1,), None),
+        (1000.0, (998.9,), None),
+        (None, (1000.0, 1000.0, 1002.0), None),
+    ],
+)
+def test_rates_that_differ_by_a_thousandth_are_one(given, stated, rate_hz):
+    known = [StatedRate(each, f"fs{k}") for k, each in enumerate(stated)]
+    if rate_hz is not None:
+        assert agreed_rate("a.csv", given, known) == rate_hz
+        return
+    with pytest.raises(RecordingError, match=r"a.csv: two sample rates: 1000 Hz \((given|fs0)\) and") as caught:
+        agreed_rate("a.csv", given, known)
+    assert ("(leave the rate out to use that of the file)" in str(caught.value)) == (given is not None)
+
+
+@pytest.mark.parametrize("size", [1e30, 1e-30])
+def test_a_channel_of_the_largest_or_smallest_size_is_taken(size):
+    drive = multisine() / np.abs(multisine()).max()
+    assert recording_from_arrays(drive * size, play(multisine()), RATE_HZ).samples == N
+    with pytest.raises(RecordingError, match="no converter gives a channel of less than 1e-30 or more than 1e"):
+        recording_from_arrays(drive * size * (1.01 if size > 1.0 else 0.99), play(multisine()), RATE_HZ)

@@ -21,7 +21,10 @@ from scipy.sparse import csc_array
 
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
 from microrad.lab.recording.formats import text as text_format
+from microrad.lab.recording.formats.arrays import stated_rate
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
+from microrad.lab.recording.formats.source import StatedRate
+from microrad.lab.recording.formats.tdms import _check_scales, check_structure
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
 from places import ROOT
@@ -142,15 +145,58 @@ def test_tdms_lengths_differ(tmp_path):
 
 
 @pytest.mark.promise("recordings-26")
-def test_tdms_starts_differ(tmp_path):
-    start = np.datetime64("2026-01-01T00:00:00")
-    late = start + np.timedelta64(10, "ms")
+@pytest.mark.parametrize(
+    ("late_us", "offset_s", "together"),
+    [(10_000, 0.0, False), (-10_000, 0.0, False), (240, 0.0, True), (260, 0.0, False), (260, -260e-6, True)],
+)
+def test_tdms_starts_differ(tmp_path, late_us, offset_s, together):
+    """By half a step of 500 us they may; where no step is known, nobody can tell."""
+    start = np.datetime64("2026-01-01T00:00:00.000000")
     path = tmp_path / "a.tdms"
-    with TdmsWriter(path) as file:
-        for name, values, begin in (("drive", DRIVE, start), ("output", OUTPUT, late)):
-            properties = {"wf_increment": 1 / RATE_HZ, "wf_start_time": begin}
-            file.write_segment([ChannelObject("bench", name, values, properties)])
-    assert "'bench/output' starts 0.01 s apart from 'bench/drive'" in refusal(path, "drive", "output")
+    begins = {"drive": {"wf_start_time": start}}
+    begins["output"] = {"wf_start_time": start + np.timedelta64(late_us, "us"), "wf_start_offset": offset_s}
+    tdms(path, more=begins)
+    if together:
+        check(read_recording(path, "drive", "output"), ("bench/drive", "bench/output"))
+    else:
+        message = refusal(path, "drive", "output")
+        assert f"'bench/output' starts {abs(late_us) * 1e-6:g} s apart from 'bench/drive'" in message
+        assert "one step is 0.0005 s); record both in one task, or cut them" in message
+    tdms(path, step=0.0, more=begins)
+    check(read_recording(path, "drive", "output", RATE_HZ), ("bench/drive", "bench/output"))
+
+
+@pytest.mark.parametrize(("last", "stated"), [(999, None), (1000, 1001)])
+def test_a_tdms_channel_has_at_most_a_thousand_scales(last, stated):
+    properties = {f"NI_Scale[{last}]_Scale_Type": "Linear", "NI_Scale[3]_Scale_Type": "Linear"}
+    if stated is None:
+        _check_scales("bench/drive", properties)
+        _check_scales("bench/drive", {"NI_Number_Of_Scales": 1000})
+        return
+    for each in (properties, {"NI_Number_Of_Scales": stated}):
+        with pytest.raises(ValueError, match=rf"^'bench/drive' states {stated} scales$"):
+            _check_scales("bench/drive", each)
+
+
+@pytest.mark.parametrize("step", ["fast", -1.0])
+def test_tdms_of_an_increment_that_is_no_step_needs_a_rate(tmp_path, step):
+    path = tdms(tmp_path / "a.tdms", step=step)
+    assert "give the rate (--rate, rate_hz) in Hz" in refusal(path, "drive", "output")
+    check(read_recording(path, "drive", "output", RATE_HZ), ("bench/drive", "bench/output"))
+
+
+def test_tdms_whose_increment_is_a_whole_number_has_its_rate(tmp_path):
+    assert read_recording(tdms(tmp_path / "a.tdms", step=1), "drive", "output").rate_hz == 1.0
+
+
+@pytest.mark.parametrize(("mask", "order"), [(0, "<"), (1 << 6, ">"), (1 << 6 | 1 << 1, ">")])
+def test_a_tdms_segment_says_in_which_order_its_bytes_stand(tmp_path, mask, order):
+    path = tmp_path / "a.tdms"
+    path.write_bytes(b"TDSm" + struct.pack("<l", mask) + struct.pack(f"{order}lQQ", 4713, 0, 0))
+    check_structure(path)
+    path.write_bytes(b"TDSm" + struct.pack("<l", mask) + struct.pack(f"{order}lQQ", 4713, 7, 0))
+    with pytest.raises(RecordingError, match=r"at byte 0, is truncated: 7 of its 7 bytes are missing"):
+        check_structure(path)
 
 
 @pytest.mark.promise("recordings-9")
@@ -168,6 +214,7 @@ def test_tdms_without_increment_needs_a_rate(tmp_path):
         (lambda b: b[:20], "has 20 of the 28 bytes of its lead-in"),
         (lambda b: b + b"TDSm12", "has 6 of the 28 bytes"),
         (lambda b: b + b"TDS", "has 3 of the 28 bytes"),
+        (lambda b: b + b"TDSn", "should begin with 'TDSm' and begins with b'TDSn'"),
         (lambda b: b + b"garbage" * 5, "should begin with 'TDSm' and begins with b'garb'"),
         (lambda b: b[:12] + b"\xff" * 8 + b[20:], "was never completed"),
         (lambda b: b[:8] + struct.pack("<l", 17) + b[12:], "states version 17"),
@@ -212,6 +259,12 @@ def test_renamed_files(tmp_path):
     packed = tmp_path / "d.csv"
     packed.write_bytes(b"\x1f\x8b\x08" + bytes(100))
     assert "unpack it first" in refusal(packed, 0, 1)
+    archive = tmp_path / "f.npy"
+    with archive.open("wb") as file:
+        np.savez(file, drive=DRIVE)
+    message = refusal(archive, 0, 1)
+    assert "the name says a NumPy array, which begins with 'NUMPY', and the first bytes are 'PK" in message
+    assert message.endswith("; rename it to 'f.npz'.")
     old = tmp_path / "e.mat"
     old.write_bytes(struct.pack("<5i", 0, N, 1, 0, 6) + b"drive\x00" + DRIVE.tobytes())
     assert "save it with -v7" in refusal(old, 0, 1)
@@ -284,6 +337,84 @@ def test_lvm_without_a_channel(tmp_path):
     path = lvm(tmp_path / "a.lvm")
     path.write_bytes(path.read_bytes().replace(b"X_Value\tdrive\toutput", b"X_Value\tComment"))
     assert "the LVM file has headers and no channel; record again" in refusal(path, 0, 1)
+
+
+@pytest.mark.parametrize("segments", [1, 3])
+def test_lvm_with_commas_between_its_cells(tmp_path, segments):
+    path = lvm(tmp_path / "a.lvm", x_columns="One", segments=segments)
+    path.write_bytes(path.read_bytes().replace(b"Separator\tTab", b"Separator\tComma").replace(b"\t", b","))
+    read = read_recording(path, "drive", "output")
+    check(read)
+    assert (read.input_units, read.output_units) == (("Volts",), ("um",))
+
+
+@pytest.mark.parametrize("segments", [1, 3])
+@pytest.mark.parametrize("end", [b"\r\n\r\n", b"\r\n", b""])
+def test_lvm_may_end_without_a_blank_line_or_the_end_of_its_last_line(tmp_path, segments, end):
+    path = lvm(tmp_path / "a.lvm", segments=segments)
+    path.write_bytes(path.read_bytes().removesuffix(b"\r\n\r\n") + end)
+    check(read_recording(path, "drive", "output"))
+    assert LvmSource(path).samples() == (N, N)
+
+
+def test_lvm_names_may_end_with_separators(tmp_path):
+    path = lvm(tmp_path / "a.lvm")
+    text = path.read_bytes()
+    path.write_bytes(text.replace(b"X_Value\tdrive\toutput", b"X_Value\tdrive\toutput\t\t"))
+    check(read_recording(path, "drive", "output"))
+    assert LvmSource(path).names == ("drive", "output")
+    path.write_bytes(text.replace(b"X_Value\tdrive\toutput", b"\t\t"))
+    assert "should name the columns, beginning with 'X_Value', and reads ''" in refusal(path, 0, 1)
+    path.write_bytes(text[: text.rindex(b"***End_of_Header***")] + b"***End_of_Header***")
+    assert "should name the columns, beginning with 'X_Value', and reads ''" in refusal(path, 0, 1)
+
+
+@pytest.mark.parametrize(
+    ("tag", "units"),
+    [("Y_Unit_Label\tVolts\tum", ("Volts", "um")), ("Y_Unit_Label\tVolts", ("Volts", "")), ("Other\t1", ("", ""))],
+)
+def test_lvm_has_the_units_that_its_header_states(tmp_path, tag, units):
+    path = lvm(tmp_path / "a.lvm", x_columns="One")
+    path.write_bytes(path.read_bytes().replace(b"Y_Unit_Label\tVolts\tum", tag.encode()))
+    assert LvmSource(path).units == ("", *units)
+
+
+@pytest.mark.parametrize("tag", [b"Other\t5.0E-4\t5.0E-4", b"Delta_X\t0\t0", b"Delta_X\tfast\tslow", b"Delta_X"])
+def test_lvm_whose_header_states_no_step_needs_a_rate_or_a_time(tmp_path, tag):
+    path = lvm(tmp_path / "a.lvm")
+    path.write_bytes(path.read_bytes().replace(b"Delta_X\t5.0E-4\t5.0E-4", tag))
+    assert "give the rate (--rate, rate_hz) in Hz" in refusal(path, "drive", "output")
+    check(read_recording(path, "drive", "output", RATE_HZ))
+    path = lvm(tmp_path / "b.lvm", x_columns="One")
+    path.write_bytes(path.read_bytes().replace(b"Delta_X\t5.0E-4\t5.0E-4", tag))
+    check(read_recording(path, "drive", "output"))
+    path = lvm(tmp_path / "c.lvm", segments=2)  # without a step nobody can tell that they go on
+    path.write_bytes(path.read_bytes().replace(b"Delta_X\t5.0E-4\t5.0E-4", tag))
+    assert LvmSource(path).names == ("0/drive", "0/output", "1/drive", "1/output")
+
+
+@pytest.mark.parametrize("tag", ["Date", "Time"])
+def test_lvm_segments_without_a_clock_or_of_another_step_are_not_joined(tmp_path, tag):
+    path = lvm(tmp_path / "a.lvm", segments=2)
+    whole = path.read_bytes()
+    before, _, behind = whole.rpartition(b"5.0E-4\t5.0E-4")
+    for text in (whole.replace(f"{tag}\t".encode(), b"Other\t"), before + b"2.0E-4\t2.0E-4" + behind):
+        path.write_bytes(text)
+        assert LvmSource(path).names == ("0/drive", "0/output", "1/drive", "1/output")
+
+
+@pytest.mark.parametrize(("gap_s", "joined"), [(0.00024, True), (0.00026, False), (-0.00024, True), (-0.00026, False)])
+def test_lvm_segments_go_on_where_half_a_step_at_most_is_between_them(tmp_path, gap_s, joined):
+    source = LvmSource(lvm(tmp_path / "a.lvm", segments=2, gap_s=gap_s))
+    assert source.names == (("drive", "output") if joined else ("0/drive", "0/output", "1/drive", "1/output"))
+    assert source.samples() == ((N, N) if joined else (N // 2,) * 4)
+
+
+def test_the_time_column_of_an_lvm_file_has_none_before_itself(tmp_path):
+    for x_columns in ("One", "Multi"):
+        source = LvmSource(lvm(tmp_path / "a.lvm", x_columns=x_columns))
+        assert source.find_time([0]) is None
+        assert [rate.rate_hz for rate in source.rates([0])] == ([] if x_columns == "One" else [RATE_HZ])
 
 
 @pytest.mark.promise("recordings-4")
@@ -447,6 +578,13 @@ def test_matlab_array_of_structures(tmp_path):
     assert "'run/Y[0]/Name' holds text; save numbers" in refusal(tmp_path / "a.mat", "run/Y[0]/Name", 1)
 
 
+def test_matlab_v73_is_known_by_hdf5s_signature_behind_any_words_of_matlab(tmp_path):
+    path = matlab73(tmp_path / "a.mat", drive=DRIVE, output=OUTPUT)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"MATLAB 7.3 MAT-file", b"MATLAB 9.9 XYZ-file", 1))
+    check(read_recording(path, "drive", "output", RATE_HZ))
+
+
 @pytest.mark.promise("recordings-26")
 @pytest.mark.parametrize(("kept", "missing"), [(200, 7992), (1000, 7192), (9000, 7256)])
 def test_truncated_matlab(tmp_path, kept, missing):
@@ -456,6 +594,18 @@ def test_truncated_matlab(tmp_path, kept, missing):
     message = refusal(path, "drive", "output", RATE_HZ)
     assert f"an element is cut off, {missing} bytes of it are missing" in message
     assert "the file is damaged or truncated: copy it again" in message
+
+
+def test_a_structure_of_matlab_without_fields_is_no_channel(tmp_path):
+    def element(kind, data):
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE})
+    head = element(6, struct.pack("<II", 2, 0)) + element(5, struct.pack("<ii", 1, 1)) + element(1, b"bare")
+    bare = element(14, head + element(5, struct.pack("<i", 1)) + element(1, b""))
+    path.write_bytes(path.read_bytes() + bare)
+    assert "'bare' is a structure without fields; name another variable" in refusal(path, "drive", "bare", RATE_HZ)
 
 
 def test_damaged_matlab_names_the_variable(tmp_path):
@@ -536,6 +686,134 @@ def test_numpy_array(tmp_path):
     np.save(path, np.vstack((DRIVE, OUTPUT)))
     check(read_recording(path, "data[0]", "data[1]", RATE_HZ), ("data[0]", "data[1]"))
     assert "give the rate" in refusal(path, 0, 1)
+
+
+@pytest.mark.parametrize(("first", "second"), [("data[0, 2, 1]", "data[0,2,1]"), ("data[0,2 , 1]", "data[0,  2,1]")])
+def test_one_channel_by_two_spellings_of_its_index_is_one_channel(tmp_path, first, second):
+    np.save(tmp_path / "a.npy", np.stack((DRIVE, OUTPUT), axis=1)[:, :, None, None] * np.ones((1, 1, 3, 2)))
+    assert "input and output are both channel 0 ('data[0, 2, 1]')" in refusal(tmp_path / "a.npy", first, second)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ("b[0, 2]", None),
+        ("b[1, 2]", None),
+        ("b[2, 2]", "'b[2, 2]' is no channel: 'b' is an array of shape (2, 1000, 3): name one channel of it"),
+        ("b[1, 3]", "'b[1, 3]' is no channel"),
+        ("b[1]", "'b[1]' is no channel"),
+        ("b[1, 2, 0]", "'b[1, 2, 0]' is no channel"),
+        ("c[0, 0]", "'c[0, 0]' is no channel: 'c' holds complex numbers, not real numbers"),
+        ("d[0, 0]", "no output channel is named 'd[0, 0]'"),
+        ("flat[2]", "no output channel is named 'flat[2]'; the nearest is 'flat[1]'"),
+    ],
+)
+def test_an_index_counts_along_each_axis_but_the_samples(tmp_path, wanted, words):
+    many = np.stack((DRIVE, OUTPUT))[:, :, None] * np.ones((1, 1, 3))
+    flat = np.column_stack((DRIVE, OUTPUT))
+    np.savez(tmp_path / "a.npz", a=many, b=many + 1.0, c=many + 1j, flat=flat, fs=RATE_HZ)
+    if words is None:
+        expected = (DRIVE if wanted == "b[0, 2]" else OUTPUT) + 1.0
+        other = "flat[1]" if wanted == "b[0, 2]" else "flat[0]"
+        read = read_recording(tmp_path / "a.npz", *((wanted, other) if other == "flat[1]" else (other, wanted)))
+        np.testing.assert_array_equal((read.drive if other == "flat[1]" else read.output)[:, 0], expected)
+    else:
+        assert words in refusal(tmp_path / "a.npz", "flat[0]", wanted)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "words"),
+    [
+        ({"fs": 1.0}, "holds no channel of numbers ('fs' is a single number; name an array); record again"),
+        ({"c": np.ones((2, 300, 3)) + 1j}, "holds no channel of numbers ('c' holds complex numbers, not real numbers"),
+        (
+            {"w": np.ones((4, 300))},
+            "holds no channel of numbers ('w' is an array of shape (4, 300): at most 3 channels",
+        ),
+        ({"m": np.ones((2, 300, 3))}, "no input channel is named 'u'; The channels are 'm' is an array of shape (2, 3"),
+    ],
+)
+def test_a_file_without_a_channel_says_what_it_holds(tmp_path, monkeypatch, arrays, words):
+    monkeypatch.setattr("microrad.lab.recording.formats.arrays._MOST_COLUMNS", 3)
+    np.savez(tmp_path / "a.npz", **arrays)
+    assert words in refusal(tmp_path / "a.npz", "u", "y")
+
+
+def test_as_many_columns_are_listed_as_may_be(tmp_path, monkeypatch):
+    monkeypatch.setattr("microrad.lab.recording.formats.arrays._MOST_COLUMNS", 2)
+    np.save(tmp_path / "a.npy", np.column_stack((DRIVE, OUTPUT)))
+    check(read_recording(tmp_path / "a.npy", 0, 1, RATE_HZ), ("data[0]", "data[1]"))
+
+
+@pytest.mark.parametrize(("count", "more"), [(20, ""), (21, " and 1 more")])
+def test_twenty_channels_are_listed_and_the_others_counted(tmp_path, count, more):
+    np.savez(tmp_path / "a.npz", **{f"x{k}": DRIVE + k for k in range(count)})
+    for wanted in (count, -1):
+        message = refusal(tmp_path / "a.npz", wanted, 1, RATE_HZ)
+        assert f"there is no input channel {wanted}: the NumPy file has {count} channels, numbered from 0" in message
+        assert f"'x19'{more})" in message
+    assert read_recording(tmp_path / "a.npz", count - 1, 0, RATE_HZ).input_names == (f"x{count - 1}",)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale"),
+    [("time", 1.0), ("t", 1.0), ("time (ms)", 1e3), ("Time [us]", 1e6), ("t_ms", 1e3), ("Zeit_ns", 1e9), ("sec", 1.0)],
+)
+def test_the_name_of_a_time_says_its_unit(tmp_path, name, scale):
+    np.savez(tmp_path / "a.npz", **{"drive": DRIVE, "output": OUTPUT, name: scale * TIME_S})
+    check(read_recording(tmp_path / "a.npz", "drive", "output"))
+    np.savez(tmp_path / "a.npz", **{"drive": DRIVE, "output": OUTPUT, name: scale * TIME_S[:-1]})
+    assert "give the rate" in refusal(tmp_path / "a.npz", "drive", "output")  # of another length, it is not theirs
+
+
+def test_a_rate_of_a_dataset_counts_for_it_and_its_columns(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["both"], file["y[1]"], file["plain"] = np.column_stack((DRIVE, OUTPUT)), OUTPUT, OUTPUT
+        file["both"].attrs["fs"], file["y[1]"].attrs["dt"] = RATE_HZ, 1 / RATE_HZ
+        file["both"].attrs["unit"] = np.bytes_("mV")
+    source = open_source(path)
+    assert [source.rates([k])[0].words for k in (0, 1, 3)] == ["both/fs = 2000 Hz"] * 2 + ["y[1]/dt = 0.0005 s"]
+    assert source.rates([2]) == []
+    assert source.units == ("mV", "mV", "", "")
+    read = read_recording(path, "both[0]", "y[1]")
+    check(read, ("both[0]", "y[1]"))
+    with h5py.File(path, "a") as file:
+        file.attrs["fs"] = 2 * RATE_HZ  # of the file: for what has none of its own
+    assert open_source(path).rates([2])[0].words == "fs = 4000 Hz"
+    check(read_recording(path, "both[0]", "both[1]"), ("both[0]", "both[1]"))
+    assert "two sample rates" in refusal(path, "both[0]", "plain")
+
+
+@pytest.mark.parametrize("value", [0.0, -5.0, np.inf, np.nan, 5e-324, [2000.0, 2000.0]])
+def test_a_scalar_that_is_no_rate_states_none(value):
+    assert stated_rate("fs", value) is None
+    assert stated_rate("dt", value) is None
+
+
+def test_a_scalar_states_a_rate_by_its_name():
+    assert stated_rate("run/FS", np.array([[2000.0]])) == StatedRate(2000.0, "run/FS = 2000 Hz")
+    assert stated_rate("dt", 0.0005) == StatedRate(2000.0, "dt = 0.0005 s")
+    assert stated_rate("gain", 2000.0) is None
+    assert stated_rate("fs", "fast") is None
+
+
+def test_a_fault_without_words_is_told_by_its_kind(tmp_path):
+    np.savez(tmp_path / "a.npz", drive=DRIVE)
+
+    def load():
+        raise KeyError
+
+    with pytest.raises(RecordingError, match=r"a\.npz: it cannot be read \(KeyError\); the file is damaged"):
+        open_source(tmp_path / "a.npz").loaded("it", load)
+
+
+def test_an_array_may_unpack_to_so_much_and_no_more(tmp_path, monkeypatch):
+    np.savez_compressed(tmp_path / "a.npz", drive=DRIVE, output=OUTPUT)
+    monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_TIMES", 0)
+    for most, fits in ((8 * N, True), (8 * N - 1, False)):
+        monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", most)
+        assert (files.too_large(tmp_path / "a.npz", (N,), 8) == "") == fits
 
 
 @pytest.mark.promise("recordings-6")
@@ -639,6 +917,28 @@ def test_headers_of_numpy_that_are_none(tmp_path, archive, header, words):
     assert words in refusal(path, 0, 0)
 
 
+@pytest.mark.parametrize(("length", "read"), [(10_000, True), (10_001, False)])
+def test_a_header_of_numpy_has_so_many_bytes_and_no_more(tmp_path, length, read):
+    (tmp_path / "a.npy").write_bytes(npy_header(WHOLE.ljust(length - 1) + b"\n") + DRIVE.tobytes())
+    if read:
+        assert open_source(tmp_path / "a.npy").samples() == (N,)
+    else:
+        assert "a header of 10001 bytes, where 10000 are enough for any array" in refusal(tmp_path / "a.npy", 0, 0)
+
+
+def test_an_array_of_an_archive_that_is_cut_off_is_named(tmp_path):
+    np.savez(tmp_path / "a.npz", drive=DRIVE, none=np.zeros(0), fs=RATE_HZ)
+    with zipfile.ZipFile(tmp_path / "a.npz", "a") as archive:
+        archive.writestr("output.npy", npy_header(WHOLE) + OUTPUT.tobytes()[: 8 * N - 800])
+        archive.writestr("notes.txt", "by hand")
+    for name, words in (
+        ("output", "is truncated, an array of shape (1000,) does not fit into "),
+        ("none", "holds no samples; record again, or name another"),
+        ("notes.txt", "is no NumPy array; name another, or add it with numpy.savez"),
+    ):
+        assert f"the output '{name}' is no channel: '{name}' {words}" in refusal(tmp_path / "a.npz", "drive", name)
+
+
 @pytest.mark.promise("recordings-26")
 def test_nan_in_an_array(tmp_path):
     path = tmp_path / "a.npz"
@@ -695,6 +995,7 @@ def odd_hdf5(tmp_path_factory):
         group.create_dataset("rows", (9,), h5py.vlen_dtype("f8"))
         group["records"] = np.zeros(9, dtype=[("t", "f8"), ("y", "f8")])
         group["complex"], group["flags"], group["none"] = DRIVE + 1j, DRIVE > 6, h5py.Empty("f8")
+        group["empty"] = np.zeros((0, 3))
         h5py.h5d.create(group.id, b"times", h5py.h5t.UNIX_D32LE, h5py.h5s.create_simple((9,)))
         group.create_dataset("foreign", (9,), "f8", chunks=(9,), compression=32015, allow_unknown_filter=True)
         twice = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -722,6 +1023,7 @@ def odd_hdf5(tmp_path_factory):
         ("complex", "holds complex numbers, not real numbers; save the real signal"),
         ("flags", "holds booleans, not real numbers; save numbers"),
         ("none", "holds no samples; record again"),
+        ("empty", "holds no samples; record again"),
         ("times", "has a type that is not read (No NumPy equivalent for TypeTimeID exists); save it as floating-point"),
         (
             "foreign",
@@ -756,6 +1058,10 @@ def masked(file, data, mask):
         ({"compression": "gzip", "shuffle": True}, 0, zlib.compress(bytes(2_000_000)), "more"),
         ({"compression": "gzip"}, 0, zlib.compress(PIECE[:10]), "less"),
         ({"compression": "gzip"}, 0, zlib.compress(PIECE)[:-9], "less"),  # cut off
+        ({"compression": "gzip"}, 0, zlib.compress(PIECE)[:-1], "less"),  # within its checksum
+        ({"compression": "lzf"}, 0, b"\x00a\xe0", "less"),  # cut off within a copy
+        ({"compression": "lzf"}, 0, b"\x00a\x20", "less"),
+        ({"compression": "lzf"}, 0, b"\x00a" + b"\xe0\xff\x00" * 15 + b"\xe0\x1e", "less"),  # behind its last length
         ({"compression": "gzip"}, 0, b"no stream", "less"),
         ({"compression": "gzip", "shuffle": True}, 0b10, PIECE[:10], "less"),  # not packed, by the mask
         ({"compression": "gzip", "fletcher32": True}, 0b11, PIECE[:3999], "less"),
@@ -846,7 +1152,19 @@ def test_matlab_v73_variables_that_are_no_channel(tmp_path):
         file["complex"] = np.zeros((1, N), dtype=[("real", "f8"), ("imag", "f8")])
         file["sparse/data"] = np.arange(9.0)
         file["sparse"].attrs["MATLAB_sparse"] = 9
+        file["#refs#/a"] = DRIVE
+        for name, attributes in (
+            ("said", {"MATLAB_class": "cell"}),  # text of another kind of string
+            ("logical", {"MATLAB_class": np.bytes_("logical")}),
+            ("decoded", {"MATLAB_int_decode": 1}),
+            ("number", {"MATLAB_class": np.bytes_("uint8"), "MATLAB_int_decode": 1}),
+        ):
+            file[name] = (DRIVE > 6).astype(np.uint8)[None]
+            file[name].attrs.update(attributes)
+        file["wide"] = DRIVE[None]
+        file["wide"].attrs["MATLAB_class"] = np.bytes_("logical")
     check(read_recording(path, "drive", "output", RATE_HZ))
+    assert open_source(path).names == ("drive", "number", "output", "wide")
     for name, words in (
         ("table", "is an object of MATLAB, which only MATLAB reads; save its numbers as arrays"),
         ("cell", "holds cells; save the numbers of each cell as an array"),
@@ -854,6 +1172,9 @@ def test_matlab_v73_variables_that_are_no_channel(tmp_path):
         ("flag", "holds no samples"),
         ("complex", "holds complex numbers, not real numbers; save the real signal"),
         ("sparse/data", "is part of a sparse matrix; save it as full"),
+        ("said", "holds cells; save the numbers of each cell as an array"),
+        ("logical", "holds booleans, not real numbers; save numbers"),
+        ("decoded", "holds booleans, not real numbers; save numbers"),
     ):
         assert f"the output '{name}' is no channel: '{name}' {words}" in refusal(path, "drive", name, RATE_HZ)
 
@@ -1016,3 +1337,27 @@ def test_a_text_whose_head_ends_within_a_character_is_utf_8():
     assert text_format._encoding(path, "µrad".encode("latin-1") + whole[: most - 4]) == "latin-1"
     assert text_format._encoding(path, "µrad".encode()) == "utf-8-sig"
     assert text_format._encoding(path, "1 µ".encode()[:-1]) == "latin-1"  # a whole file that ends so is none
+
+
+def test_a_sample_of_a_text_stands_on_its_line_behind_blank_lines_and_remarks(tmp_path):
+    rows = [f"{k},{k + 1}" for k in range(6)]
+    lines = ["# made today", "", "drive,angle", rows[0], "", "# a remark", "  % another", rows[1], "   ", *rows[2:]]
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n\n# the end\n", "utf-8")
+    source = open_source(tmp_path / "a.csv")
+    assert [source.place(row) for row in range(7)] == [f"line {k}" for k in (4, 8, 10, 11, 12, 13)] + ["the end"]
+
+
+def test_a_text_of_a_message_is_cut_behind_so_many_characters():
+    assert text_format.short(f"  {'a' * 40} ") == "a" * 40
+    assert text_format.short("a" * 41) == "a" * 39 + "…"
+    assert text_format.short("abc", 3) == "abc" and text_format.short("abcd", 3) == "ab…"
+
+
+@pytest.mark.parametrize(
+    ("size", "reason"),
+    [(9, "holds only blank lines and comments"), (10, "holds only blank"), (11, "has no line break in its first")],
+)
+def test_a_text_that_is_as_long_as_its_head_is_whole(tmp_path, monkeypatch, size, reason):
+    monkeypatch.setattr(text_format, "_HEAD_BYTES", 10)
+    (tmp_path / "a.csv").write_bytes(b"#".ljust(size, b"a"))
+    assert reason in refusal(tmp_path / "a.csv", 0, 1)

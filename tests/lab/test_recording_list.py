@@ -209,6 +209,7 @@ def test_what_is_not_fitted_may_stand_before_what_is(tmp_path):
         ("", "is empty"),
         ("name = 'x'\n", "a table [recording.NAME] for each recording, with its file"),
         ("recording = 3\n", "is no group of named tables"),
+        ("recording = {}\n", "is no group of named tables; a table [recording.NAME] for each recording, with its file"),
         ("[recording.a\n", "is no table header"),
     ],
 )
@@ -231,6 +232,12 @@ def test_what_is_no_list(tmp_path, text, words):
         ("signs = [[true]]", "has an item that is none of 1, -1 and 0"),
         ("signs = [[]]", "is no list of that kind; a list for each output, with 1, -1 or 0 for each input"),
         ("signs = 1", "is no list of that kind; a list for each output"),
+        ('axes = ["channels", "periods"]', "does not say which axis is samples; the axes of the array in their order"),
+        (
+            'axes = ["samples", "time"]',
+            'holds "time", which is none of them; a list of different words out of samples,',
+        ),
+        ("period = 1", "is below 2"),
     ],
 )
 def test_what_is_no_value_of_its_key(tmp_path, line, words):
@@ -245,6 +252,86 @@ def test_a_key_takes_so_many_items_and_no_more(tmp_path):
     assert "there is no such file" in refusal(tmp_path, text.format(list(range(MOST_ITEMS))))
     (told,) = faults(tmp_path, text.format(list(range(MOST_ITEMS + 1)))).values()
     assert "is no list of that kind" in told
+
+
+def test_a_list_has_so_many_recordings_and_no_more(tmp_path):
+    entries = [f'[recording.r{k}]\nfile = "a.csv"\n' for k in range(MOST_ITEMS + 1)]
+    common = "input = 1\noutput = 2\n"
+    assert "there is no such file" in refusal(tmp_path, common + "".join(entries[:-1]))
+    (told,) = faults(tmp_path, common + "".join(entries)).values()
+    assert told == "is no group of named tables; a table [recording.NAME] for each recording, with its file"
+
+
+@pytest.mark.parametrize(("begin", "end"), [("2 s", "2 s"), ("2 s", "1.9 s")])
+def test_a_part_that_does_not_begin_before_it_ends_is_no_part(tmp_path, begin, end):
+    text = f'[recording.a]\nfile = "a.csv"\ninput = 1\noutput = 2\nfrom = "{begin}"\nto = "{end}"\n'
+    assert faults(tmp_path, text) == {("recording.a.to", 6): "is not above from; a later time"}
+
+
+def test_arrays_alone_in_their_files_need_no_names(tmp_path):
+    np.save(tmp_path / "u.npy", DRIVE)
+    np.save(tmp_path / "y.npy", OUTPUT)
+    np.save(tmp_path / "z.npy", OUTPUT[::-1])
+    entry = '[recording.{}]\nfile = "u.npy"\noutput_file = "{}.npy"\naxes = ["samples", "channels"]\nrate = "1 kHz"\n'
+    held_out = entry.format("b", "z") + 'role = "validation"\n'  # the same drives, and outputs of another file
+    found = read_list(write_list(tmp_path, entry.format("a", "y") + held_out))
+    np.testing.assert_array_equal(found.recordings[0].output, OUTPUT)
+    np.testing.assert_array_equal(found.validation[0].output, OUTPUT[::-1])
+    told = faults(tmp_path, entry.format("a", "y") + held_out.replace("z.npy", "y.npy"))
+    assert list(told) == [("recording.b", 6)]
+    assert "takes samples for validation that [recording.a] fits" in told["recording.b", 6]
+
+
+@pytest.mark.parametrize("time", ["3", '"clock"', '["clock"]'])
+def test_the_time_may_be_a_column_that_is_not_called_so(tmp_path, time):
+    rows = np.column_stack((DRIVE[:, 0], OUTPUT[:, 0], TIME_S * 3, TIME_S)).tolist()
+    text = "u,y,other,clock\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows)
+    (tmp_path / "a.csv").write_text(text)
+    entry = '[recording.a]\nfile = "a.csv"\ninput = "u"\noutput = "y"\n'
+    (found,) = read_list(write_list(tmp_path, f"{entry}time = {time}\n")).recordings
+    assert found.rate_hz == pytest.approx(RATE_HZ)
+    assert "give the rate" in refusal(tmp_path, entry)
+
+
+@pytest.mark.parametrize("axes", ["", 'axes = ["samples"]\n'])
+def test_what_a_check_finds_can_be_taken_on_in_a_list(tmp_path, axes):
+    np.savez(tmp_path / "a.npz", u=DRIVE[:, 0], y=np.minimum(OUTPUT[:, 0], 0.5), fs=RATE_HZ)
+    entry = f'[recording.a]\nfile = "a.npz"\ninput = "u"\noutput = "y"\n{axes}'
+    message = refusal(tmp_path, entry)
+    assert "To take it on as it is: --accept clipping" in message
+    (found,) = read_list(write_list(tmp_path, f'{entry}accept = ["clipping"]\n')).recordings
+    assert [each.kind for each in found.findings if each.refused] == ["clipping"]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('positions = [["0 mm", "1 mm"], ["0 mm", "2 mm"]]', "positions has 2 places and there are 1 outputs, y; give"),
+        (
+            "signs = [[1], [1]]",
+            "signs has rows of 1, 1 items and there are 1 outputs and 1 inputs; give a row for each",
+        ),
+        ("signs = [[1, 1]]", "signs has rows of 2 items and there are 1 outputs and 1 inputs; give a row for each"),
+    ],
+)
+def test_places_and_signs_are_as_many_as_the_channels_of_a_single_axis(tmp_path, line, words):
+    np.savez(tmp_path / "a.npz", u=DRIVE[:, 0], y=OUTPUT[:, 0], fs=RATE_HZ)
+    entry = '[recording.a]\nfile = "a.npz"\ninput = "u"\noutput = "y"\n'
+    assert words in refusal(tmp_path, f"{line}\n{entry}")
+    fitting = 'positions = [["0 mm", "1 mm"]]\nsigns = [[-1]]\n'
+    found = read_list(write_list(tmp_path, fitting + entry))
+    assert (found.positions_m, found.signs) == (((0.0, 0.001),), ((-1,),))
+
+
+@pytest.mark.parametrize(("output", "told"), [('"y"', False), ('["y", "x"]', True)])
+def test_recordings_of_one_drive_are_judged_together_where_they_have_several_outputs(tmp_path, output, told):
+    np.savez(tmp_path / "a.npz", u=DRIVE[:, 0], y=OUTPUT[:, 0], x=OUTPUT[::-1, 0] + OUTPUT[:, 0], fs=RATE_HZ)
+    entry = f'[recording.{{}}]\nfile = "a.npz"\ninput = "u"\noutput = {output}\n'
+    both = entry.format("a") + entry.format("b")
+    if told:
+        assert "a.npz: the same data as" in refusal(tmp_path, both)
+    else:
+        assert len(read_list(write_list(tmp_path, both)).recordings) == 2
 
 
 @pytest.mark.parametrize(

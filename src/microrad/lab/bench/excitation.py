@@ -373,7 +373,7 @@ def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int
     if block >= 1 and abs(exact - block) <= _WHOLE:
         return block
     ratio = Fraction(limits.rate_hz / freq_hz).limit_denominator(1000)
-    fits = abs(ratio.denominator * limits.rate_hz / freq_hz - ratio.numerator) <= _WHOLE
+    fits = ratio > 0 and abs(ratio.denominator * limits.rate_hz / freq_hz - ratio.numerator) <= _WHOLE
     near = format_quantity(periods * limits.rate_hz / max(block, 1), "Hz", 9)
     reason = f"of {format_quantity(freq_hz, 'Hz')}: {periods} of them fill {exact:.6g} samples, no whole number"
     expected = f"a multiple of {ratio.denominator}, or a frequency of {near}" if fits else f"a frequency of {near}"

@@ -146,7 +146,7 @@ class LvmSource(Container):
         """Whether each segment has the channels of the first and starts one step behind the end of the one before."""
         for before, after in zip(self._segments, self._segments[1:], strict=False):
             starts = self._start_s(before), self._start_s(after)
-            step = self._number(before.tags.get("Delta_X", [""])[0])
+            step = self._number((before.tags.get("Delta_X") or [""])[0])
             if before.names != after.names or before.tags.get("Delta_X") != after.tags.get("Delta_X"):
                 return False
             # The clock of the header is cut to microseconds.
