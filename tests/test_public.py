@@ -138,6 +138,12 @@ def test_a_name_of_0_1_0_says_where_it_lives_now(name):
     assert name not in dir(microrad)
 
 
+def test_all_public_names_and_the_version_are_what_a_star_brings():
+    scope = {}
+    exec("from microrad import *", scope)
+    assert scope.keys() - {"__builtins__"} == {*microrad._PUBLIC, "__version__"} == set(microrad.__all__)
+
+
 @pytest.mark.promise("decisions-1", "readme-16")
 def test_there_are_few_names_and_they_load_nothing():
     code = "import sys, microrad; print(len(sys.modules), 'numpy' in sys.modules)"

@@ -821,6 +821,60 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, monkeypatch):
     assert "problem  kernels" in call("doctor").out
 
 
+@pytest.mark.parametrize(
+    ("version", "wanted", "fits"),
+    [
+        ("3.11.0", ">=3.11", True),
+        ("3.10.9", ">=3.11", False),
+        ("3.13.9", ">=3.11,<3.14", True),
+        ("3.14.0", ">=3.11, <3.14", False),
+        ("3.10.0", ">=3.11,<3.14", False),
+        ("3.14.0", "<3.14", False),
+        ("3.13.0", "<3.14", True),
+        ("2.7.0", "", True),
+    ],
+)
+def test_doctor_knows_which_pythons_are_supported(monkeypatch, version, wanted, fits):
+    monkeypatch.setattr(installation.metadata, "metadata", lambda name: {"Requires-Python": wanted})
+    monkeypatch.setattr(installation.platform, "python_version", lambda: version)
+    assert installation._python() == (fits, f"{version} ({sys.executable}), wanted {wanted}")
+
+
+@pytest.mark.parametrize(
+    ("version", "fits"), [("2.4", True), ("2.4.0", True), ("2.3.9", False), ("2.10.1", True), ("2.4rc1", True)]
+)
+def test_doctor_takes_the_oldest_library_that_is_wanted(monkeypatch, version, fits):
+    monkeypatch.setattr(installation.metadata, "version", lambda name: version)
+    assert installation._library("json", "2.4") == (fits, f"{version}, wanted 2.4 or later")
+
+
+@pytest.mark.parametrize(
+    ("width", "largest", "agrees"), [(14.056, 74.446, True), (14.07, 74.44, False), (14.05, 74.42, False)]
+)
+def test_both_numbers_of_the_compiled_kernels_have_to_be_the_known_ones(monkeypatch, width, largest, agrees):
+    from microrad.mirror import hysteresis
+
+    loop = SimpleNamespace(width=width / 100.0, hysteresis_rad=np.array([0.0, -1e-6 * largest, 1e-6]))
+    monkeypatch.setattr(hysteresis, "BoucWen", lambda *args: SimpleNamespace(loop=lambda *args: loop))
+    assert installation._kernels() == (
+        agrees,
+        f"loop width {width:.2f} % (known: 14.05 %), max|h| {largest:.2f} µrad (known: 74.44 µrad)",
+    )
+
+
+def test_doctor_says_that_compilation_is_switched_off_and_makes_the_folder_of_the_cache(monkeypatch, tmp_path):
+    from microrad.core import kernels
+
+    monkeypatch.setattr(kernels, "closed_loop", lambda: None)
+    assert installation._cache() == (
+        False,
+        "compilation is switched off by NUMBA_DISABLE_JIT: unset it, or a study takes hours",
+    )
+    place = tmp_path / "a" / "cache"
+    monkeypatch.setattr(kernels, "closed_loop", SimpleNamespace(stats=SimpleNamespace(cache_path=str(place))))
+    assert installation._cache() == (True, f"{place} is writable") and list(place.iterdir()) == []
+
+
 def test_doctor_finds_an_old_library(monkeypatch):
     monkeypatch.setattr(
         installation.metadata,
@@ -1082,7 +1136,59 @@ def test_without_a_stderr_progress_goes_nowhere(monkeypatch):
         progress(1, 2, "rows")
 
 
+def test_a_bar_moves_when_it_is_time_or_at_the_end_of_a_phase(monkeypatch):
+    now, shown = SimpleNamespace(s=100.0), []
+
+    class Bar:
+        def __init__(self, console, *, transient, auto_refresh):
+            assert (transient, auto_refresh) == (True, False)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *error):
+            pass
+
+        def add_task(self, what, total):
+            assert (what, total) == ("reading", None)
+            return "task"
+
+        def update(self, task, **state):
+            self.state = task, *state.values()
+
+        def refresh(self):
+            shown.append((now.s, self.state))
+
+    monkeypatch.setattr("rich.progress.Progress", Bar)
+    monkeypatch.setattr(frame, "_BAR_S", 0.25)
+    monkeypatch.setattr(frame, "time", SimpleNamespace(monotonic=lambda: now.s))
+    monkeypatch.setattr(sys, "stderr", SimpleNamespace(isatty=lambda: True))
+    with frame.progress_bar() as progress:
+        for now.s, done in ((100.0, 0), (100.125, 1), (100.25, 2), (100.375, 3), (100.4375, 9)):
+            progress(done, 9, "rows")
+    assert shown == [(at, ("task", done, 9, "rows")) for at, done in ((100.0, 0), (100.25, 2), (100.4375, 9))]
+
+
 # ------------------------------------------------------------------------------------------------- parts of the frame
+@pytest.mark.parametrize("printed", [0, frame.UNMET, frame.UNREAD, frame.REFUSED, frame.INTERRUPTED])
+def test_what_is_left_to_do_is_done_unless_the_printing_was_interrupted(monkeypatch, printed):
+    said = []
+
+    def print_it(text, code):
+        said.append((text, code))
+        return printed
+
+    @frame.command
+    def body():
+        return frame.Outcome("verdict", 1, afterwards=lambda: "written")
+
+    monkeypatch.setattr(frame, "_printed", print_it)
+    with pytest.raises(typer.Exit) as stop:
+        body()
+    assert stop.value.exit_code == printed
+    assert said == [("verdict", 1), *([("written", printed)] if printed != frame.INTERRUPTED else [])]
+
+
 @pytest.mark.parametrize(("met", "closes"), [(True, False), (False, True), (True, True), (False, False)])
 def test_the_exit_code_says_what_it_was_asked_to_judge(met, closes):
     assert frame.Judged.REQUIREMENTS.code(met=met, closes=closes) == (0 if met else 1)
@@ -1111,12 +1217,16 @@ def test_a_record_of_progress_is_left_out_only_within_a_phase_and_never_the_last
     steps = [
         (100.0, 0, 9, "a", True),
         (100.1, 1, 9, "a", False),
-        (100.21, 2, 9, "a", True),
+        (100.24, 2, 9, "a", False),
+        (100.26, 2, 9, "a", True),
         (100.3, 3, 9, "b", True),
         (100.31, 3, 8, "b", True),
         (100.32, 4, 8, "b", False),
         (100.33, 8, 8, "b", True),
+        (101.0, 1, 8, "b", True),
+        (101.25, 2, 8, "b", True),
     ]
+    monkeypatch.setattr(frame, "_PROGRESS_S", 0.25)
     with (tmp_path / "progress").open("ab", buffering=0) as file:
         progress = frame._progress_records(file)
         for now.s, done, total, what, _ in steps:
@@ -1221,3 +1331,114 @@ def test_there_is_a_position_for_each_output_or_none(monkeypatch, places):
     assert recordings._together(alone) is alone and len(together) == 1
     with pytest.raises(frame.Refusal, match="every recording is for validation: leave one to be fitted"):
         recordings._together(recordings.Given((), (made_up(1, 1),)))
+
+
+@pytest.mark.parametrize(
+    ("model", "static", "fitted"),
+    [
+        (lab.Model.BEST, True, ("prandtl_ishlinskii", "bouc_wen")),
+        (lab.Model.BOUC_WEN, True, ("prandtl_ishlinskii", "bouc_wen")),
+        (lab.Model.BOUC_WEN_CREEP, True, ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_creep")),
+        (lab.Model.BEST, False, identify.MODELS),
+        (lab.Model.LINEAR, False, identify.MODELS),
+    ],
+)
+def test_the_model_that_is_asked_for_is_fitted_beside_those_of_the_ladder(
+    refused, folder, monkeypatch, model, static, fitted
+):
+    asked = []
+
+    def fit(recordings, hold_out, seed, models, bar, **options):
+        asked.append((len(recordings), hold_out, seed, models))
+        raise identify.IdentificationError("asked")
+
+    monkeypatch.setattr("microrad.lab.identify.identify", fit)
+    columns = COLUMNS if static else COLUMNS[:-1]
+    path = write_recording(folder / "loop.csv")
+    refused("identify", path, *columns, "--model", model.value, "--seed", "3", "--hold-out", "0.25")
+    assert asked == [(1, 0.25, 3, fitted)]
+
+
+@pytest.mark.parametrize(
+    ("model", "admissible", "written"),
+    [
+        (lab.Model.BEST, False, "linear"),
+        (lab.Model.BEST, True, "linear"),
+        (lab.Model.BOUC_WEN, False, "bouc_wen"),
+        (lab.Model.BOUC_WEN, True, "bouc_wen_admissible"),
+        (lab.Model.BOUC_WEN_CREEP, True, "bouc_wen_creep"),
+    ],
+)
+def test_the_mirror_file_has_the_model_that_is_asked_for_or_the_chosen_one(model, admissible, written):
+    assert lab._written(SimpleNamespace(chosen="linear"), model, admissible) == written
+    best = lab._written(SimpleNamespace(chosen="bouc_wen"), lab.Model.BEST, admissible)
+    assert best == ("bouc_wen_admissible" if admissible else "bouc_wen")
+
+
+@pytest.mark.parametrize(
+    ("name", "listed", "title"),
+    [(None, None, "l" * 200), (None, "of the list", "of the list"), ("mine", "of the list", "mine"), ("", "list", "")],
+)
+def test_a_mirror_is_called_as_is_said_or_as_its_list_or_its_files(refused, folder, monkeypatch, name, listed, title):
+    def identified(given, units, said, target, how, as_json):
+        raise frame.Refusal(f"{given.name}|{units}|{target.title}|{target.mirror_file}|{target.page}")
+
+    given = recordings.Given((made_up(1, 1),), (), name=listed)
+    monkeypatch.setattr(lab, "given_recordings", lambda options: given)
+    monkeypatch.setattr(lab, "unit_of", lambda given, which, said, assumed: (assumed, "assumed"))
+    monkeypatch.setattr(lab, "_identify_axis", identified)
+    file = "l" * 201
+    said = refused("identify", f"{file}.csv", *(() if name is None else ("--name", name)))
+    units = "('V', 'mrad')"
+    assert said == f"microrad: {listed}|{units}|{title}|{file}-mirror.toml|{file}-mirror.html\n"
+    said = refused("identify", "a.csv", "--mirror-file", "lab.toml", "--output", "x")
+    assert said.endswith("|lab.toml|lab.html\n")
+
+
+@pytest.mark.parametrize(("columns", "taken"), [((), (None, None)), (("u",), ("u", None)), (("u", "y"), ("u", "y"))])
+def test_whole_arrays_have_one_drive_and_one_output_at_most(monkeypatch, columns, taken):
+    read = []
+    monkeypatch.setattr("microrad.lab.recording.read_arrays", lambda *args, **options: read.append((args, options)))
+    options = recordings.Options((), columns[:1], columns[1:], axes="samples , channels", rate=5.0, accept=("drift",))
+    recordings._reader(options)("u.npy", "y.npy")
+    told = {"axes": ["samples", "channels"], "output_path": "y.npy", "accept": ("drift",), "alone": False}
+    assert read == [(("u.npy", *taken, 5.0), {**told, "period_samples": None})]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"input": ("a", "b")}, "leave out a second --input or --output"),
+        ({"output": ("a", "b")}, "leave out a second --input or --output"),
+        ({"time": "t", "input": ("a", "b")}, "leave out --time"),
+    ],
+)
+def test_whole_arrays_refuse_a_second_column_of_either_kind(options, words):
+    with pytest.raises(frame.Refusal, match=words):
+        recordings._reader(recordings.Options((), axes="samples", **options))
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ({}, "--input is missing: name the column of the drive"),
+        ({"input": ("u",)}, "--output is missing: name the column of the sensor"),
+        ({"output_file": (Path("y"),)}, "--output-file is for whole arrays"),
+    ],
+)
+def test_columns_of_tables_are_named(said, words):
+    with pytest.raises(frame.Refusal, match=words):
+        recordings._reader(recordings.Options((), **said))
+
+
+def test_a_folder_of_the_bench_keeps_what_is_said_of_the_mirror(monkeypatch, tmp_path):
+    both = [(made_up(1, 1), "identification"), (made_up(1, 2), "validation")]
+    accepted = []
+    monkeypatch.setattr("microrad.lab.bench.read_folder", lambda path, accept: accepted.append(accept) or both)
+    monkeypatch.setattr("microrad.lab.recording.check_together", lambda *parts: None)
+    places = ((0.0, 1.0), (2.0, 3.0))
+    options = recordings.Options((tmp_path,), lever_arm=0.05, position=places, accept=("drift",))
+    found = recordings.given_recordings(options)
+    assert (found.recordings, found.validation) == ((both[0][0],), (both[1][0],))
+    assert (found.virtual, found.lever_arm_m, found.positions_m, accepted) == (True, 0.05, places, [("drift",)])
+    assert recordings.given_recordings(recordings.Options((tmp_path,))).positions_m is None

@@ -525,3 +525,53 @@ def test_a_larger_margin_and_drives_of_hysteresis_are_data_of_a_design_of_severa
         assert data.get("tuned_for_modulus_margin") == margin
         assert data["matrices"].get("drives_of_hysteresis") == (None if forward is None else [[5.0, 5.0]])
         assert (data["margins"]["disk"], data["margins"]["disk_hz"]) == (0.4, 80.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "times"),
+    [
+        ((), [("APE", None, None)]),
+        (("--spacing", "1 min"), [("APE", None, None)]),
+        (
+            ("--window", "10 ms", "--spacing", "1 min", "--spacing", "2 min"),
+            [
+                ("APE", None, None),
+                ("MPE", 0.01, None),
+                ("RPE", 0.01, None),
+                ("PDE", 0.01, 60.0),
+                ("PDE", 0.01, 120.0),
+            ],
+        ),
+    ],
+)
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_worst_case_is_of_the_windows_that_are_given_and_of_the_mirror_of_its_kind(
+    call, monkeypatch, tmp_path, given, times, axes
+):
+    asked = []
+
+    def searched(subject, seed, indices, on_progress):
+        asked.append((subject, seed, [(each.kind, each.window_s, each.spacing_s) for each in indices]))
+        return SimpleNamespace(unstable_draws=0, unstable_corners=0)
+
+    def design(scene, progress, names):
+        made = [f"{each} of {axes}" for each in names]
+        return SimpleNamespace(made=made) if axes == 2 else made
+
+    for room, scene_of, of in (
+        (controller_study, "of_scene", "of_table"),
+        (coupled_study, "of_coupled_scene", "of_several_axes"),
+    ):
+        seeded = SimpleNamespace(table=SimpleNamespace(seed=7))
+        monkeypatch.setattr(room, "scene", lambda *args, seeded=seeded: seeded)
+        monkeypatch.setattr(room, "design", design)
+        monkeypatch.setattr(f"microrad.loop.worst_case.{of}", lambda *args, of=of: of)
+        monkeypatch.setattr(f"microrad.loop.worst_case.{scene_of}", lambda scene, known, made: (known, made))
+    monkeypatch.setattr("microrad.loop.worst_case.worst_case", searched)
+    monkeypatch.setattr(worst_case, "worst_case_text", lambda found, width: f"a text of {width} columns")
+    (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+    mirror = ("--mirror", tmp_path / "two-axes.toml") if axes == 2 else ()
+    result = call("worst-case", DEFAULT, *mirror, "--controller", "LQG", *given)
+    assert (result.code, result.out) == (0, "a text of 80 columns\n")
+    known = "of_several_axes" if axes == 2 else "of_table"
+    assert asked == [((known, f"LQG of {axes}"), 7, times)]

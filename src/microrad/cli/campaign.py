@@ -84,7 +84,7 @@ def _kept(path: Path) -> Iterator[None]:
         raise KeyboardInterrupt(words) from None
 
 
-def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
+def _shown(path: Path, as_json: bool) -> Outcome:
     """The state of a ledger, as text or JSON; the exit code says whether the rows keep the limits."""
     from microrad.campaign.statistics.summary import summarise_campaign
     from microrad.report.campaign.data import campaign_data
@@ -95,7 +95,7 @@ def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
     code = MET if verdict(found) == "pass" else UNMET
     if as_json:
         return Outcome(json_text({**campaign_data(found), "ledger": str(path)}), code)
-    return Outcome(f"{campaign_text(found, width())}\n\n{output or path}", code)
+    return Outcome(f"{campaign_text(found, width())}\n\n{path}", code)
 
 
 @campaigns.command(epilog=examples("microrad campaign init", "microrad campaign init tails.toml"))
