@@ -133,7 +133,7 @@ def kvn_field(path: Path, number: int, line: str) -> Field:
             f"{path}, line {number}: {line.strip()[:60]!r} is neither 'KEY = value' nor a keyword that may stand here; "
             "repair or remove the line"
         )
-    return Field(match[1].upper(), match[2] or match[4] or "", match[3] or "", f"line {number}")
+    return Field(match[1].upper(), match[2] or match[4], match[3] or "", f"line {number}")
 
 
 def add_field(fields: dict[str, Field], new: Field, path: Path) -> None:
@@ -252,7 +252,7 @@ def _ordinal(text: str) -> int:
     if re.fullmatch(r"[0-9]{4}-[0-9]{3}", text):
         first = date(int(text[:4]), 1, 1).toordinal()
         day = first + int(text[5:]) - 1
-        if date.fromordinal(day).year != int(text[:4]) or int(text[5:]) < 1:
+        if date.fromordinal(day).year != int(text[:4]):  # day 0 is of the year before
             raise ValueError("no such day of the year")
         return day
     if not re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", text):
