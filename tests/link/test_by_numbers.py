@@ -1,14 +1,16 @@
 """Links and searches by numbers alone: beside power densities by hand and drawn targets."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from microrad.link import gains
 from microrad.link.acquisition.detection import simulate_scan
 from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
-from microrad.link.by_numbers import received_power, scan_times
+from microrad.link.by_numbers import LEAST, MOST, received_power, scan_times
 
 
 def test_received_power_is_power_density_times_area():
@@ -82,3 +84,31 @@ def test_a_scan_that_would_fill_the_memory_is_refused(changed):
     scan = {"sigma_rad": 100e-6, "beam_radius_rad": 20e-6, "detection_time_s": 5e-3}
     with pytest.raises(ValueError, match=r"a target is within reach of .* tracks"):
         scan_times(**{**scan, **changed})
+
+
+GIVEN = {"power_w": 1.0, "half_angle_rad": 8e-6, "distance_m": 45e6, "aperture_m": 0.25, "wavelength_m": 1064e-9}
+
+
+def test_the_far_field_holds_from_where_it_begins():
+    waist_m = GIVEN["wavelength_m"] / (math.pi * GIVEN["half_angle_rad"])
+    begins_m = gains.far_field_m(2.0 * waist_m, GIVEN["wavelength_m"])
+    assert received_power(**GIVEN | {"distance_m": begins_m}).warnings == ()
+    assert len(received_power(**GIVEN | {"distance_m": math.nextafter(begins_m, 0.0)}).warnings) == 1
+
+
+@pytest.mark.parametrize("losses", [None, {}])
+def test_without_further_losses_there_are_five_lines(losses):
+    found = received_power(**GIVEN, losses_db=losses)
+    names = ["Power", "Transmit gain", "Pointing loss", "Free space", "Receive gain"]
+    assert [line.name for line in found.lines] == names
+    assert found.received_dbm == pytest.approx(math.fsum(line.value for line in found.lines))
+
+
+@pytest.mark.parametrize("size", [LEAST, MOST])
+def test_numbers_are_taken_from_the_least_to_the_most_that_a_quantity_has(size):
+    assert received_power(**GIVEN | {"power_w": size}).lines[0].value == pytest.approx(10 * math.log10(size * 1e3))
+    beyond = size / 2.0 if size == LEAST else size * 2.0
+    with pytest.raises(
+        ValueError, match=re.escape(f"the power is {beyond:g} W: nothing is below {LEAST:g} or above {MOST:g}")
+    ):
+        received_power(**GIVEN | {"power_w": beyond})

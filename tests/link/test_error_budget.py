@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import integrate, signal, stats
+from scipy import integrate, optimize, signal, stats
 
 from microrad.core import lti
 from microrad.link.error_budget.assembly import source_of
-from microrad.link.error_budget.budget import budget, shares, total
+from microrad.link.error_budget.budget import beyond, budget, shares, total
 from microrad.link.error_budget.contributions import Requirement, _at_its_worst, contribution, contributions
 from microrad.link.error_budget.correlation import Correlation
 from microrad.link.error_budget.distributions import Bundle, case
@@ -500,7 +500,14 @@ AT_2 = replace(FAST, A=np.diag([-2.0, -3.0]))
         (lambda: contributions([source("random"), source("constant", gains=np.ones(2))], APE), "give all as many"),
         (lambda: contributions([source("random")], replace(APE, axes=(1,))), "axis 1 is asked for"),
         (lambda: total([], APE), "a budget without a source"),
-        (lambda: replace(APE, confidence=1.0), "give a share"),
+        (lambda: replace(APE, confidence=1.0), "a confidence of 1: give a share"),
+        (lambda: replace(APE, confidence=0.0), "a confidence of 0: give a share"),
+        (lambda: replace(APE, limit_rad=math.inf), "a limit of inf rad; give a finite one above zero"),
+        (lambda: source("drift", period_s=0.0), "period_s is 0; give a finite number above zero"),
+        (lambda: source("periodic", freq_hz=math.inf), "freq_hz is inf; give a finite number above zero"),
+        (lambda: source("random", 1.0, "uniform", 1.0, gains=ONE, freq_hz=1.0), "has no freq_hz; leave it out"),
+        (lambda: source("constant", gains=replace(FAST, A=np.diag([0.0, -1.0]))), "has a pole of 0 rad/s"),
+        (lambda: source("random", -0.0, "gaussian", -1.0), "the width >= 0"),
         (lambda: replace(APE, interpretation="both"), 'no interpretation "both"'),
         (lambda: replace(APE, axes=(0, 1, 2)), "give one, or two"),
         (
@@ -594,6 +601,18 @@ def test_correlated_noises_stand_with_common_deviations_at_their_worst_time():
         (two(), [Correlation("a", "a", 0.5)], "name two sources"),
         (two(), [Correlation("a", "b", 0.5), Correlation("b", "a", 0.1)], "give each pair once"),
         (two(), [Correlation("a", "b", 1.5)], "give one from -1 to 1"),
+        (two(), [Correlation("a", "b", -1.001)], "the coefficient is -1.001; give one from -1 to 1"),
+        (two(spread="gaussian", width=1.0), [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
+        (
+            [replace(source("constant", 1.0, "uniform", 1.0), name=name) for name in "ab"],
+            [Correlation("a", "b", 0.5)],
+            "only two Gaussian errors of one class",
+        ),
+        (
+            [replace(source("constant", 1.0, "gaussian", 1.0, gains=FAST), name=name) for name in "ab"],
+            [Correlation("a", "b", 0.5)],
+            "that reach the axes by gains",
+        ),
         (two(even_in_time=True), [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
         (UNLIKE_PAIR, [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
         (
@@ -787,3 +806,99 @@ def test_without_its_only_source_a_budget_is_nothing():
     found = {each.name: each.without_rad for each in shares(total(contributions(parts, both), both))}
     assert found["a random error"] == pytest.approx(2.0 * math.sqrt(2.0))
     assert found["a constant error"] == pytest.approx(0.1 * stats.rayleigh.ppf(P), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("index", "observation_s"), [(ErrorIndex("PDE", 1.0, 2.0), 3.0), (ErrorIndex("PRE", 1.0, 2.0), 2.0)]
+)
+def test_windows_may_fill_their_observation_period_to_its_end(index, observation_s):
+    assert Requirement(index, observation_s=observation_s).observation_s == observation_s
+
+
+def test_a_limit_that_is_met_exactly_is_kept():
+    found = total(contributions([source("constant", 3.0)], APE), replace(APE, limit_rad=3.0))
+    assert (found.quantile_rad, found.holds) == (3.0, True)
+    assert not replace(found, required=replace(APE, limit_rad=math.nextafter(3.0, 0.0))).holds
+    assert replace(found, required=APE).holds is None
+
+
+def test_shares_of_nothing_but_constants_are_those_of_their_lengths():
+    required = Requirement(ErrorIndex("APE"), limit_rad=10.0)
+    sources = [
+        replace(source("constant", 6.0, gains=np.array([1.0, 0.0])), name="along"),
+        replace(source("constant", 3.0, gains=np.array([0.0, 1.0])), name="across"),
+    ]
+    first, second = shares(total(contributions(sources, required), required))
+    assert (first.name, second.name) == ("along", "across")
+    assert [first.total_rad, first.without_rad, second.without_rad] == pytest.approx([math.sqrt(45.0), 3.0, 6.0])
+    assert [first.growth, second.growth] == pytest.approx([0.8, 0.2])
+    assert first.part_rad + second.part_rad == pytest.approx(math.sqrt(45.0))
+    allowed = [math.sqrt(91.0) / 6.0, 8.0 / 3.0]
+    assert [first.allowed, second.allowed] == pytest.approx(allowed, rel=1e-4)
+    without_limit = shares(total(contributions(sources, required), replace(required, limit_rad=None)))
+    assert [each.allowed for each in without_limit] == [None, None]
+    missed = shares(total(contributions(sources, required), replace(required, limit_rad=2.0)))
+    assert [each.allowed for each in missed] == [0.0, 0.0]
+
+
+def test_the_share_beyond_a_size_of_a_long_mean_is_that_along_it():
+    required = Requirement(ErrorIndex("APE"))
+    sources = [
+        replace(source("constant", 1.0, gains=np.array([3.0, 4.0])), name="mean"),
+        source("random", 0.01, gains=np.ones(2), apart=True),
+    ]
+    found = total(contributions(sources, required), required)
+    sizes = np.array([4.98, 5.0, 5.01, 6.0])
+    wanted = stats.norm.sf((sizes - 5.0) / 0.01)
+    np.testing.assert_allclose(beyond(found, sizes), wanted, atol=2e-3)
+    assert beyond(found, np.array([1e3]))[0] == 0.0
+
+
+def test_the_share_beyond_a_size_of_a_constant_is_all_or_nothing():
+    found = total(contributions([source("constant", -3.0)], APE), APE)
+    assert beyond(found, np.array([2.9, 3.0, 3.1])).tolist() == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("spread", "width"), [("gaussian", 1.0), ("uniform", 1.5)])
+def test_a_drift_whose_rate_is_hardly_spread_is_the_product_of_rate_and_time(spread, width):
+    """A rate of 4, spread by less than half of itself, times a time from 0 to 2."""
+    required = replace(APE, interpretation="mixed")
+    drifting = source("drift", 4.0, spread, width, period_s=2.0)
+    found = total(contributions([drifting], required), required).quantile_rad
+    rate = stats.norm(4.0, width) if spread == "gaussian" else stats.uniform(4.0 - width, 2.0 * width)
+    times = 2.0 * (np.arange(4000) + 0.5) / 4000
+    wanted = optimize.brentq(lambda size: np.mean(rate.sf(size / times)) - (1.0 - P), 1.0, 30.0)
+    assert found == pytest.approx(wanted, rel=1e-2)
+
+
+@pytest.mark.parametrize("turns", [0.25, 0.5, 1.0, 1.7])
+def test_a_sinusoid_at_its_worst_is_the_largest_that_it_leaves_of_its_mean_in_a_window(turns):
+    required = Requirement(ErrorIndex("RPE", 2.0), axes=(0,), interpretation="ensemble")
+    found = total(contributions([source("periodic", 3.0, freq_hz=turns / 2.0)], required), required).quantile_rad
+    phase, inside = np.linspace(0.0, 2.0 * np.pi, 721)[:, None], np.linspace(0.0, 1.0, 401)
+    mean = (np.sin(phase + 2.0 * np.pi * turns) - np.sin(phase)) / (2.0 * np.pi * turns)
+    left = 3.0 * np.abs(np.cos(phase + 2.0 * np.pi * turns * inside) - mean)
+    assert found == pytest.approx(left.max(), rel=1e-4)
+
+
+@pytest.mark.parametrize("rho", [-1.0, 1.0])
+def test_a_coefficient_of_one_is_taken(rho):
+    (found,) = budget(two(3.0, 4.0), [APE], [Correlation("a", "b", rho)])
+    assert found.sigma_rad[0] == pytest.approx(abs(3.0 * rho + 4.0), rel=1e-9)
+
+
+def test_a_constant_behind_a_transfer_is_what_it_comes_to_at_rest():
+    slow = lti.StateSpace(np.array([[-2.0]]), np.array([[1.0]]), np.array([[4.0]]), np.array([[0.5]]))
+    direct = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[0.5]]))
+    for through, gain in ((slow, 2.5), (direct, 0.5)):
+        found = total(contributions([source("constant", 2.0, gains=through)], APE), APE)
+        assert found.quantile_rad == pytest.approx(2.0 * gain, rel=1e-12)
+
+
+def test_the_worst_satellite_lies_three_sigma_or_the_half_width_out_and_away_from_zero():
+    for shape, mean, worst in (("gaussian", 2.0, 5.0), ("gaussian", -2.0, -5.0), ("uniform", 2.0, 3.0)):
+        assert Spread(shape, mean, 1.0).worst == worst
+    assert Spread("fixed", -2.0).worst == -2.0
+    turned = Spread("uniform", 2.0, 1.0).times(-2.0)
+    assert (turned.shape, turned.mean, turned.width) == ("uniform", -4.0, 2.0)
+    assert source("random", 0.0, "gaussian", 0.0).size.worst == 0.0

@@ -19,6 +19,7 @@ from microrad.link.fade_series import (
     code,
     coded_fading,
     read_fade_series,
+    reader,
 )
 from microrad.link.fade_series.coded import cost
 from microrad.link.fade_series.codes import mutual_information
@@ -464,3 +465,46 @@ def test_the_code_has_the_paths_that_its_threshold_follows_from():
     assert [*zip(own.distances, own.weights, strict=True)][: len(named.weights)] == [*named.weights]
     assert own.rate == named.rate
     assert own.word_bits == 5 * 7  # what a decoder looks back, in bits of information
+
+
+def test_a_file_of_200_samples_without_times_is_told_that_they_are_missing(tmp_path):
+    path = tmp_path / "long_enough.csv"
+    path.write_text("power\n" + "1\n" * 200)
+    with pytest.raises(FadeSeriesError, match=r"long_enough\.csv: the file does not say how fast it was sampled"):
+        read_fade_series(path, unit="linear", normalised="mean")
+
+
+@pytest.mark.parametrize(("spare", "taken"), [(0, True), (-1, False)])
+def test_a_file_of_the_largest_size_is_read(tmp_path, monkeypatch, spare, taken):
+    path = tmp_path / "a.csv"
+    path.write_text("power\n" + "1\n" * 200)
+    monkeypatch.setattr(reader, "MOST_BYTES", path.stat().st_size + spare)
+    given = {"unit": "linear", "normalised": "mean", "period_s": 1e-3, "name": "the fades"}
+    if taken:
+        assert read_fade_series(path, **given).source == "the fades"
+    else:
+        with pytest.raises(FadeSeriesError, match=r"^the fades: the file has 0 MB"):
+            read_fade_series(path, **given)
+
+
+@pytest.mark.parametrize("unit", ["db", "dB", "DBM"])
+def test_levels_of_a_file_are_levels_however_it_writes_them(tmp_path, unit):
+    path = tmp_path / "a.csv"
+    path.write_text(f"power ({unit})\n" + "0\n-10\n" * 100)
+    given = {"normalised": "largest", "period_s": 1e-3}
+    assert_allclose(read_fade_series(path, unit="dB", **given).power[:2], [1.0, 0.1])
+    with pytest.raises(FadeSeriesError, match="the unit given is 'linear'; give the one that the file says"):
+        read_fade_series(path, unit="linear", **given)
+
+
+def test_a_series_as_long_as_is_needed_is_long_enough():
+    series = series_of(np.ones(1000))
+    series.at_least_as_long_as(series.duration_s, "a word lasts")
+    with pytest.raises(FadeSeriesError, match="the series lasts 10 ms and a word lasts 10 ms"):
+        series.at_least_as_long_as(series.duration_s * (1.0 + 1e-6), "a word lasts")
+
+
+def test_powers_and_levels_are_taken_up_to_the_largest_and_darkness_too():
+    assert series_of(np.r_[np.ones(299), 1e30]).power[-1] == pytest.approx(300.0)
+    assert series_of(np.r_[np.full(299, -np.inf), 300.0], unit="dB", normalised="largest").power[-1] == 1.0
+    assert series_of(np.r_[np.zeros(299), 2.0], normalised="largest").power[[0, -1]].tolist() == [0.0, 1.0]

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
-from microrad.link import beams, receivers
+from microrad.link import beams, gains, receivers
 from microrad.link import study as link_study
 from microrad.link.budget.lines import LEFT_AT_ZERO
 
@@ -584,3 +585,71 @@ def test_a_pattern_needs_to_know_how_its_aperture_is_lit(read):
     with pytest.raises(ValueError, match=r"needs the table \[communication.beam\]: how the aperture is lit"):
         link.of(read().mission.with_value("conventions.pointing_loss", "pattern"))
     assert GAUSSIAN["radius"] == "2 cm"
+
+
+# ---- what is stated as nothing, and limits that are met exactly
+def test_a_budget_closes_at_no_margin_and_where_as_much_arrives_as_was_sent(read):
+    plain = budget_of(read())
+    sent_w = 1e-3 * 10.0 ** (plain.lines[0].value / 10.0)
+    for margin_db, closes in ((0.0, True), (-0.5e-9, True), (-1e-8, False)):
+        assert dataclasses.replace(plain, margin_db=margin_db).closes == closes
+    for share, possible in ((1.0 - 1e-12, True), (1.0 + 1e-9, False)):
+        found = dataclasses.replace(plain, margin_db=1.0, received_power_w=share * sent_w)
+        assert (found.possible, found.closes) == (possible, possible)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "none", "line"),
+    [
+        ("heterodyne bpsk", "phase_error", "0 rad", "Phase error penalty"),
+        ("homodyne bpsk", "inter_symbol_loss", "0 dB", "Inter-symbol loss"),
+    ],
+)
+def test_what_is_stated_as_nothing_is_told_from_what_is_not_given(read, name, key, none, line):
+    for value, basis in ((none, "as given"), (None, "taken as none")):
+        budget = budget_of(read(received_with(name, **{key: value})))
+        found = line_of(budget, line)
+        assert (found.value, found.basis, found.warning) == (0.0, basis, LEFT_AT_ZERO)
+        assert (found.source == "not given") == (value is None)
+        assert line in budget.at_zero
+
+
+def test_a_loss_between_symbols_that_is_stated_is_taken_off(read):
+    plain, lossy = (
+        budget_of(read(received_with("homodyne bpsk", inter_symbol_loss=loss))) for loss in (None, "0.5 dB")
+    )
+    found = line_of(lossy, "Inter-symbol loss")
+    assert (found.value, found.basis, found.warning) == (-0.5, "as given", "")
+    assert lossy.margin_db == pytest.approx(plain.margin_db - 0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        None,
+        SimpleNamespace(satellite_radius_m=None, elevation_rad=0.5),
+        SimpleNamespace(satellite_radius_m=7e6, elevation_rad=math.pi / 2.0),
+    ],
+    ids=["vacuum", "of a stated elevation", "to the zenith"],
+)
+def test_without_an_elevation_that_goes_with_the_range_farther_is_by_its_square(path):
+    data = SimpleNamespace(range_m=1e6, shared=SimpleNamespace(path=path))
+    np.testing.assert_allclose(link.farther_db(data, [5e5, 1e6, 1e7]), [-20.0 * math.log10(2.0), 0.0, 20.0], atol=1e-12)
+
+
+def test_the_air_of_its_parts_is_scattering_haze_and_absorption_each_of_which_may_be_none(read):
+    """Haze of a depth d at 1 um is d (wavelength / 1 um)^-a; nothing of it without a depth."""
+
+    def loss(**given):
+        m = read({"channel": {"elevation": "90 deg", "height": "0 m", **given}}).mission
+        return link.of(m).air_db
+
+    clean = loss(aerosol_depth=0.0, angstrom_exponent=1.3, absorption="0 dB")
+    flat = loss(aerosol_depth=0.1, angstrom_exponent=0.0, absorption="0 dB")
+    steep = loss(aerosol_depth=0.1, angstrom_exponent=1.3, absorption="0 dB")
+    wet = loss(aerosol_depth=0.0, angstrom_exponent=1.3, absorption="0.4 dB")
+    mass = gains.air_mass(math.pi / 2.0)
+    assert clean == pytest.approx(gains.rayleigh_depth(WAVELENGTH, 0.0) * 10.0 / math.log(10.0) * mass, rel=1e-6)
+    assert flat - clean == pytest.approx(0.1 * 10.0 / math.log(10.0) * mass, rel=1e-9)
+    assert steep - clean == pytest.approx((flat - clean) * (WAVELENGTH / 1e-6) ** -1.3, rel=1e-9)
+    assert wet - clean == pytest.approx(0.4 * mass, rel=1e-9)

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from types import SimpleNamespace
 
 import pytest
 
@@ -215,3 +216,65 @@ def test_a_margin_that_no_value_has_is_left_by_none(tmp_path):
     (distance,) = (each for each in variation.inputs(m, "communication") if each.shown == "communication.distance")
     solved = variation.solve(m, (distance,), "m", lambda m: 0.0, 0.0, lambda m: False)
     assert (solved.intervals, solved.best_db) == ((), -math.inf)
+
+
+def numbered(value, above=-math.inf, below=math.inf, key="a.key"):
+    """An input whose table is the number itself, allowed between two bounds."""
+    rule = SimpleNamespace(out_of_bounds=lambda number: "" if above <= number <= below else "is beyond")
+    return SimpleNamespace(key=key, value=value, rule=rule, moved=lambda tables, number: number)
+
+
+def solve(margin_db, value=1.0, unit="dB", required_db=0.0, possible=lambda _: True, **bounds):
+    return variation.solve(value, (numbered(value, **bounds),), unit, margin_db, required_db, possible)
+
+
+def test_a_margin_that_is_just_left_at_one_value_is_left_there():
+    found = solve(lambda x: -abs(x - 1.0))
+    (only_one,) = found.intervals
+    assert (only_one.low, only_one.high) == (pytest.approx(1.0, abs=1e-9), pytest.approx(1.0, abs=1e-9))
+    assert (only_one.low_open, only_one.high_open) == (False, False)
+    assert (found.best, found.best_db) == (1.0, 0.0)
+
+
+def test_decibels_are_looked_for_60_db_up_and_down():
+    found = solve(lambda x: 1000.0 + x)
+    (whole,) = found.intervals
+    assert (whole.low, whole.high, whole.low_open, whole.high_open) == (-59.0, 61.0, True, True)
+    assert (found.searched, found.best) == ((-59.0, 61.0), 61.0)
+
+
+def test_what_is_no_decibel_is_looked_for_six_decades_up_and_down():
+    found = solve(lambda x: 1000.0 + x, value=2.0, unit="m")
+    assert found.searched == pytest.approx((2e-6, 2e6))
+    with pytest.raises(ValueError, match=r"a\.key is 0, which no factor moves"):
+        solve(lambda x: x, value=0.0, unit="m")
+    assert solve(lambda x: x, value=0.0, unit="dB").searched == (-60.0, 60.0)
+
+
+def test_a_bound_of_the_rule_leaves_an_end_open_and_a_margin_does_not():
+    found = solve(lambda x: x + 3.0, below=5.0)
+    (kept,) = found.intervals
+    assert (kept.low, kept.low_open) == (pytest.approx(-3.0), False)
+    assert (kept.high, kept.high_open) == (pytest.approx(5.0, abs=1e-6), True)
+    assert found.searched == (-59.0, pytest.approx(5.0))
+    lower = solve(lambda x: 3.0 - x, above=-2.0)
+    (kept,) = lower.intervals
+    assert (kept.low, kept.low_open) == (pytest.approx(-2.0, abs=1e-6), True)
+    assert (kept.high, kept.high_open) == (pytest.approx(3.0), False)
+    assert lower.searched == (pytest.approx(-2.0), 61.0)
+
+
+def test_a_margin_may_be_left_in_two_intervals_and_by_no_impossible_value():
+    found = solve(lambda x: (x - 1.0) ** 2 - 25.0, possible=lambda x: abs(x) < 30.0)
+    first, second = found.intervals
+    assert [first.high, second.low] == pytest.approx([-4.0, 6.0])
+    assert [first.low, second.high] == pytest.approx([-30.0, 30.0])
+    assert (first.low_open, second.high_open) == (False, False)
+
+
+def test_a_margin_that_hardly_moves_does_not_move():
+    with pytest.raises(ValueError, match=r"a\.key moves this margin by nothing"):
+        solve(lambda x: 1e-12 * x)
+    assert len(solve(lambda x: 1e-9 * x).intervals) == 1
+    assert solve(lambda _: -math.inf).intervals == ()
+    assert solve(lambda _: -math.inf).best_db == -math.inf

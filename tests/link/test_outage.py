@@ -529,3 +529,57 @@ def test_errors_of_a_histogram_are_even_in_the_square_inside_each_bin():
     assert np.sum(spread.share * spread.radius_rad**2) == pytest.approx(mean, rel=1e-12, abs=0.0)
     inside = spread.radius_rad**2 < middle + 0.3 * (high - middle)
     assert np.sum(spread.share[inside]) == pytest.approx(0.25 + 0.75 * 0.3, abs=0.75 / 32)
+
+
+def exposure(on_axis_db=3.0, lost_db=0.0, ahead_rad=0.0, error_rad=0.0, received_db=0.0):
+    """A link that stands still."""
+    fall = beams.GaussianFall(1e-5)
+    return link_performance.Exposure(
+        fall, on_axis_db, lost_db, ahead_rad, error_rad, lambda reach: float(error_rad > reach), received_db, None, 0.0
+    )
+
+
+def test_a_margin_that_is_kept_exactly_is_not_missed():
+    assert exposure().short_of(3.0) == 0.0
+    assert exposure().short_of(math.nextafter(3.0, 4.0)) == 1.0
+    assert exposure(received_db=1.0).short_of(2.0) == 0.0
+    assert exposure(received_db=1.0).short_of(2.1) == 1.0
+    assert exposure(ahead_rad=1e-6).short_of(3.0) == 1.0  # the point-ahead alone costs some
+    assert exposure(error_rad=1e-6).short_of(3.0) == 1.0
+
+
+def test_as_much_light_as_was_sent_may_arrive_and_no_more():
+    assert exposure().possible
+    assert not exposure(lost_db=-1e-9).possible
+    assert exposure(lost_db=-1.0, received_db=1.0).possible
+
+
+def test_fades_are_counted_down_to_a_margin_of_nothing():
+    jitter = pointing.Jitter((1e-6, 0.0), (1e-6, 1e-6))
+    motion = pointing.SpectralMotion((1e-6, 1e-6), (1e-4, 1e-4), (0.0, 0.0), 100.0)
+    data = SimpleNamespace(turbulent=None, receiving=None, beam=SimpleNamespace(fall=beams.GaussianFall(1e-5)))
+    assert not any(math.isnan(x) for x in link_performance._fades(jitter, motion, data, 1e-6)[:2])
+    assert all(math.isnan(x) for x in link_performance._fades(jitter, motion, data, -1e-6)[:2])
+    assert all(math.isnan(x) for x in link_performance._fades(jitter, None, data, 1.0)[:2])
+    data.turbulent = object()
+    assert "fades are not counted" in link_performance._fades(jitter, motion, data, 1.0)[2]
+
+
+def test_a_receiver_moves_as_its_jitter_says_and_without_one_as_its_twin_does():
+    end = SimpleNamespace(error_rad=lambda margin_db: 2e-5)
+    coupling = SimpleNamespace(jitter=None)
+    data = SimpleNamespace(receiving=SimpleNamespace(is_random=True, end=end), table=SimpleNamespace(coupling=coupling))
+    jitter = pointing.Jitter((0.0, 0.0), (1e-6, 2e-6))
+    sent = pointing.MovingEnd(jitter, (1e-4, 2e-4), 1e-5)
+    lost_db = 20.0 / math.log(10.0)  # of a Gaussian beam at its half angle
+    assert link_performance._moving(data, sent, lost_db).half_angle_rad == pytest.approx(2e-5)
+    assert link_performance._moving(data, sent, 4.0 * lost_db).half_angle_rad == pytest.approx(1e-5)
+    twin = link_performance._moving(data, sent, lost_db)
+    assert (twin.jitter, twin.velocity_rms_rad_s) == (jitter, (1e-4, 2e-4))
+    assert link_performance._moving(data, sent, 0.0) is None
+    data.receiving.is_random = False
+    assert link_performance._moving(data, sent, lost_db) is None
+    data.receiving.is_random, end.error_rad = True, lambda margin_db: math.inf
+    assert link_performance._moving(data, sent, lost_db) is None
+    data.receiving = None
+    assert link_performance._moving(data, sent, lost_db) is None

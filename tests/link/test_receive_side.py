@@ -13,6 +13,7 @@ from microrad.campaign.rows.evaluate import _exposure
 from microrad.link import coupling
 from microrad.link import study as link_study
 from microrad.link.acquisition.partner_search import _return_reach
+from microrad.link.budget.lines import _coupling_lines, _few_modes
 from microrad.link.pointing import outage as link_performance
 from microrad.link.pointing.code_words import FadeMargin
 from microrad.link.pointing.coded_residual import CodedBeam
@@ -21,6 +22,7 @@ from microrad.link.pointing.outage import ErrorDistribution, Exposure, GaussianE
 from microrad.link.radial_error import Jitter
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.mission.file import MissionError
+from microrad.mission.model import source_text
 from microrad.study.pointing_penalty import Binned
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
@@ -337,3 +339,36 @@ def test_what_does_not_fit_is_refused_with_its_key(tmp_path, table, changes, sai
 )
 def test_what_meets_a_limit_of_the_coupling_is_taken(tmp_path, table, changes):
     assert with_coupling(tmp_path, table, changes).mission.communication.coupling.into == table["into"]
+
+
+def test_a_receiver_that_is_stated_to_point_without_error_is_told_from_one_of_which_nothing_is_said(tmp_path):
+    name = "Receive pointing loss"
+    for given, basis in (({"pointing_error": "0 rad"}, "error = 0 rad"), ({}, "taken as none")):
+        lines, budget = lines_of(with_coupling(tmp_path, FIBRE | given))
+        assert (lines[name].value, lines[name].basis) == (0.0, basis)
+        assert name in budget.at_zero
+        assert (lines[name].source != "not given") == bool(given)
+
+
+def test_the_loss_of_a_receiver_that_moves_says_whose_errors_those_are_and_how_often_they_exceed_it(tmp_path):
+    for own, moving in (("twin", {"twin": True}), ("jitter.rms", {"jitter": THEIRS})):
+        file = with_coupling(tmp_path, FIBRE | moving, JITTER)
+        data = link.of(file.mission)
+        (line,) = [
+            each
+            for each in _coupling_lines(SimpleNamespace(sources={}, table="communication"), data)
+            if each.name == "Receive pointing loss"
+        ]
+        share = f"exceeded for {100.0 * file.mission.requirement.outage:g} % of the time"
+        assert line.basis == f"what it adds to the pointing loss, both together {share}"
+        assert line.regime == "errors of the two ends independent"
+        assert line.source == source_text({}, f"communication.coupling.{own}")
+
+
+@pytest.mark.parametrize(
+    ("radius_um", "aperture", "few"), [(25.0, 0.2, False), (4.0, 0.1, True), (None, 0.1, False), (4.0, None, False)]
+)
+def test_a_fibre_of_few_modes_is_warned_of(radius_um, aperture, few):
+    radius_m = None if radius_um is None else radius_um * 1e-6
+    said = _few_modes(SimpleNamespace(core_radius_m=radius_m, numerical_aperture=aperture), 1.55e-6)
+    assert said.startswith("the fibre has V = 1.62, too few modes") if few else said == ""

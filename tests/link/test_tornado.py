@@ -13,7 +13,7 @@ from microrad.link import study as link_study
 from microrad.link import variation
 from microrad.link.pointing import outage as link_performance
 from microrad.link.variation import RELATIVE, STEP_DB
-from microrad.mission.fields import Quantity
+from microrad.mission.fields import Quantity, Share
 from microrad.mission.file import load_link
 from shipped import SHIPPED
 
@@ -417,3 +417,28 @@ def test_a_phase_error_and_its_ratio_move_no_further_than_some_power_reaches(tmp
         assert moved.swing_db > 1.0
         assert (0.155 if key == "phase_error" else 1e-6) == moved.value
         assert moved.high < 0.1652 if key == "phase_error" else 1e-7 < moved.low < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "rule", "strehl", "ends"),
+    [
+        ("loss_db", 0.5, Quantity("dB", least=0.0), "ratio", (0.0, 1.0)),
+        ("loss_db", 0.2, Quantity("dB", least=0.0), "ratio", (0.0, 0.7)),
+        ("ratio_db", 0.5, Quantity("dB", above=0.0), "ratio", (0.25, 1.0)),
+        ("ratio_db", 0.6, Quantity("dB", above=0.0), "ratio", (0.1, 1.1)),
+        ("strehl", 0.9, Quantity(""), "ratio", (0.81, 0.99)),
+        ("strehl", 0.95, Quantity(""), "ratio", (0.855, 1.0)),
+        ("strehl", -1.0, Quantity(""), "decibel", (-1.5, -0.5)),
+        ("outage", 0.1, Share(""), "ratio", (0.01, 0.55)),
+        ("outage", 0.01, Share(""), "ratio", (0.001, 0.1)),
+        ("bit_error_ratio", 0.2, Share("", below=0.5), "ratio", (0.02, 0.35)),
+        ("share", 0.8, Share(""), "ratio", (0.72, 0.88)),
+        ("share", 0.95, Share(""), "ratio", (0.855, 0.975)),
+        ("angle", -2.0, Quantity("rad"), "ratio", (-2.2, -1.8)),
+        ("angle", 3.0, Quantity("rad", most=3.1), "ratio", (2.7, 3.1)),
+    ],
+)
+def test_a_swing_goes_a_tenth_or_half_a_decibel_to_either_side_and_half_way_to_an_open_bound(
+    field, value, rule, strehl, ends
+):
+    assert variation._ends(field, value, rule, strehl) == pytest.approx(ends, abs=1e-12)

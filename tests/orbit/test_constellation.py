@@ -11,10 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from day_files import BY_FILE, day_file, element_set
+from day_files import BY_FILE, KEPLERIAN, day_file, element_set
+from link_files import received_with
 from microrad import orbit
 from microrad.link import study as link_study
-from microrad.orbit import constellation, files, operations
+from microrad.orbit import constellation, files, from_mission, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.constellation import opportunities
 from microrad.orbit.propagation import mean_elements
@@ -507,3 +508,23 @@ SAID_OF_A_PLAN = (
 def with_other(plan, **changes):
     """What the words say of a plan, some of it changed."""
     return SimpleNamespace(**{name: getattr(plan, name) for name in SAID_OF_A_PLAN} | changes)
+
+
+def test_a_receiver_that_takes_no_rate_of_the_link_leaves_the_stations(tmp_path):
+    """The relays are never in reach then; what a ground station takes is its own."""
+    fast = {"operations.rates": ["3.3 Gbit/s"], **received_with("homodyne bpsk"), "orbit.duration": "3 h"}
+    file = day_file(tmp_path, fast, shared_stations("kiruna"))
+    found = constellation.run_constellation(file, day_study.PointingLoss(1.0, 0.01, "stated"))
+    assert found.planned and {one.relay for one in found.planned} == {"kiruna"}
+    assert {one.rate_bit_s for one in found.planned} == {1e9}
+
+
+@pytest.mark.parametrize(
+    ("changes", "has"),
+    [({}, True), (FILED, True), ({"constellation": BY_FILE}, True), ({"orbit.leo": KEPLERIAN}, True)],
+)
+def test_a_constellation_repeats_elements_or_has_a_file(tmp_path, changes, has):
+    m = day_file(tmp_path, changes).mission
+    assert from_mission.repeats(m.constellation, m.orbit) == has
+    slot = m.orbit.model_copy(update={"leo": m.orbit.geo})
+    assert from_mission.repeats(m.constellation, slot) == (m.constellation.pattern == "file")

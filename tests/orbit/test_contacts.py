@@ -18,6 +18,7 @@ from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.earth.figure import Earth, Station, elevation_rad, gravity
 from microrad.orbit.earth.sun import shadow_rad, sun_direction
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
+from microrad.orbit.visibility import contacts as visible
 from microrad.orbit.visibility import events, limits
 from microrad.orbit.visibility.contacts import (
     Sampled,
@@ -148,8 +149,11 @@ def test_rows_are_solved_each_for_itself():
 
 
 def test_what_cannot_be_searched_is_refused():
-    with pytest.raises(OrbitError, match="do not rise; sort them"):
-        events.positive(np.sin, np.array([0.0, 2.0, 1.0]))
+    for times in ([0.0, 2.0, 1.0], [0.0, 1.0, 1.0, 2.0]):
+        with pytest.raises(OrbitError, match="do not rise; sort them"):
+            events.positive(np.sin, np.array(times))
+    with pytest.raises(OrbitError, match="not finite at 0 s"):
+        events.positive(lambda t: np.where(t == 0.0, np.inf, t), np.arange(3.0))
     with pytest.raises(OrbitError, match="at least 3"):
         events.positive(np.sin, np.array([0.0, 2.0]))
     with pytest.raises(OrbitError, match=r"\(2, 4\) values at 3 times; give as many values as times"):
@@ -247,7 +251,10 @@ def test_the_range_in_a_coplanar_contact_goes_from_35286_to_44253_km():
     assert by_hand.visible_share == pytest.approx(by_hand.duration_s / by_hand.repeat_s)
 
 
-@pytest.mark.parametrize("radius_m", [6000e3, 6478e3, 42200e3, math.nan])
+@pytest.mark.parametrize(
+    "radius_m",
+    [6000e3, EARTH_RADIUS_M + 100e3, GEOSTATIONARY_RADIUS_M, 42200e3, math.nan],
+)
 def test_a_coplanar_orbit_below_the_air_or_above_the_slot_is_refused(radius_m):
     with pytest.raises(OrbitError, match="not between the surface to clear"):
         coplanar_contact(radius_m, 100e3)
@@ -355,6 +362,13 @@ def test_samples_kept_are_used(monkeypatch):
     assert max(asked) < 1441
 
 
+@pytest.mark.parametrize("furthest_m", [0.0, -1.0])
+def test_a_link_that_closes_nowhere_has_no_contact_with_any_relay(furthest_m):
+    relays = [free(SLOT), free(GeostationarySlot("other", EPOCH, 0.3))]
+    assert contacts_with_each(free(leo()), relays, ROUND, EPOCH, DAY, furthest_m=furthest_m) == ((), ())
+    assert contacts_with_each(free(leo()), [], ROUND, EPOCH, DAY, furthest_m=furthest_m) == ()
+
+
 def test_the_steps_follow_the_perigee():
     assert coarse_step_s(leo(), 0.0) == coarse_step_s(leo(altitude_m=120e3, j2=True), 0.0) == 60.0
     assert coarse_step_s(SLOT, 0.0) == 960.0
@@ -365,6 +379,13 @@ def test_the_steps_follow_the_perigee():
             coarse_times(span_s, 60.0)
     with pytest.raises(OrbitError, match=r"in steps of 1e-06 s, more than 5e\+06 of them"):
         coarse_times(DAY, 1e-6)
+
+
+def test_a_search_has_as_many_samples_as_it_may_and_not_one_more(monkeypatch):
+    monkeypatch.setattr(visible, "_MOST_SAMPLES", 8)
+    assert coarse_times((0.0, 480.0), 60.0).size == 9
+    with pytest.raises(OrbitError, match="give a shorter span"):
+        coarse_times((0.0, 480.1), 60.0)
 
 
 @pytest.mark.parametrize("velocity", [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1e200, 0.0, 1.0], [math.nan, 0.0, 0.0]])

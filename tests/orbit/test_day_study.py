@@ -2,12 +2,14 @@
 
 import itertools
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from day_files import ALONE, HELD, LIMITS, day_file, ephemeris
+from day_files import ALONE, HELD, KEPLERIAN, LIMITS, day_file, ephemeris
+from link_files import received_with
 from microrad import link, orbit
 from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M
@@ -15,7 +17,9 @@ from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
 from microrad.orbit.earth import figure
 from microrad.orbit.from_mission import TAIL_S
+from microrad.orbit.propagation.analytic import node_of_local_time
 from microrad.orbit.propagation.ephemeris import EphemerisOrbit
+from microrad.orbit.visibility.limits import UNLIMITED
 
 C_M_S = 299_792_458.0
 EARTH_POLAR_M = EARTH_RADIUS_M * (1.0 - 1.0 / 298.257223563)
@@ -811,3 +815,148 @@ def test_an_assumption_that_the_mission_does_not_make_is_not_changed(links, day,
     alone |= {"local time of the node", "ground stations"}  # it has one station
     assert {name for name, sides in found.items() if None in sides} == alone & found.keys()
     assert "time of acquisition" not in {name for name, *_ in assumptions._changes(own, None)}
+
+
+@pytest.mark.parametrize(("factor", "doubled"), [(2.0, True), (1.999, False), (1.0, False)])
+def test_a_rate_is_doubled_where_the_receiver_takes_twice_as_much(links, day, factor, doubled):
+    m = links.file.mission
+    rate = m.communication.data_rate_bit_s
+    data = replace(links.data, receiver=SimpleNamespace(highest_data_rate_bit_s=factor * rate))
+    own = assumptions.Case(m.operations, m.orbit, data, day.loss)
+    slow, fast = next(sides for name, *sides in assumptions._changes(own, None) if name == "laser data rate")
+    assert slow[1].data.table.data_rate_bit_s == 0.5 * rate
+    assert (fast is not None) == doubled
+    steps = m.operations.with_value("rates_bit_s", (rate,))
+    assert "laser data rate" not in dict(named(assumptions._changes(replace(own, operations=steps), None)))
+
+
+def named(changes):
+    """The assumptions by name with their sides in words."""
+    return [(name, [None if side is None else side[0] for side in sides]) for name, *sides in changes]
+
+
+def test_one_of_several_stations_is_left_out(links, day):
+    m = links.file.mission
+    (name,) = m.operations.downlink.stations
+    both = {name: m.operations.downlink.stations[name], "other": m.operations.downlink.stations[name]}
+    own = assumptions.Case(m.operations.with_value("downlink.stations", both), m.orbit, links.data, day.loss)
+    made = {each: sides for each, *sides in assumptions._changes(own, None)}
+    (fewer, left), (more, grown) = made["ground stations"]
+    assert (fewer, more) == (f"without {name}", f"one more, opposite {name}")
+    assert list(left.operations.downlink.stations) == ["other"]
+    assert list(grown.operations.downlink.stations) == [name, "other", f"opposite {name}"]
+
+
+def test_masks_are_doubled_up_to_the_highest_that_a_mission_takes(links, day):
+    m = links.file.mission
+    (name,) = m.operations.downlink.stations
+    given = m.operations.downlink.stations[name].with_value("mask_rad", math.radians(60.0))
+    steep = m.operations.with_value("downlink.stations", {name: given})
+    own = assumptions.Case(steep, m.orbit, links.data, day.loss)
+    (_, flat_), (_, high) = next(s for each, *s in assumptions._changes(own, None) if each == "elevation mask")
+    assert flat_.operations.downlink.stations[name].mask_rad == 0.0
+    assert math.degrees(high.operations.downlink.stations[name].mask_rad) == pytest.approx(89.0)
+
+
+def test_a_margin_of_nothing_is_raised_to_3_db_and_one_that_is_asked_for_is_doubled(links, day):
+    m = links.file.mission
+    for given, low, high in ((0.0, None, "3 dB"), (2.0, "0 dB", "4 dB")):
+        own = assumptions.Case(m.operations.with_value("margin_db", given), m.orbit, links.data, day.loss)
+        assert dict(named(assumptions._changes(own, None)))["margin demanded of the laser link"] == [low, high]
+
+
+def test_a_lower_rate_that_reaches_no_further_never_serves():
+    of = [flow.Closing(4.0, 0.0, 4e7), flow.Closing(3.0, 0.0, 4e7), flow.Closing(2.0, 0.0, 3e7)]
+    assert flow.rate_table((*of, flow.Closing(1.0, 0.0, 5e7))).steps == ((4.0, 4e7), (1.0, 5e7))
+    assert flow.rate_table(()) is None
+
+
+def test_a_rate_above_the_receivers_is_left_out_and_its_highest_is_not(tmp_path):
+    rates = {"operations.rates": ["1 Gbit/s", "3.2 Gbit/s", "3.3 Gbit/s"]}
+    m = day_file(tmp_path, received_with("homodyne bpsk"), rates).mission
+    data = link.of(m)
+    found = flow.closings(m.operations, data, PointingLoss(1.0, 0.0, "stated"))
+    assert data.receiver.highest_data_rate_bit_s == pytest.approx(3.2e9)
+    assert [each.rate_bit_s for each in found] == [3.2e9, 1e9]
+    assert flow.closings(m.operations.with_value("rates_bit_s", (3.3e9,)), data, PointingLoss(1.0, 0.0, "")) == ()
+
+
+@pytest.mark.parametrize(
+    ("contact", "share", "parts"),
+    [
+        ((10.0, 20.0), 1.0, [(10.0, 20.0)]),
+        ((10.0, 20.0), 0.5, [(10.0, 15.0)]),
+        ((90.0, 100.0), 0.5, [(90.0, 95.0)]),
+        ((90.0, 110.0), 0.5, [(90.0, 95.0), (100.0, 105.0)]),
+        ((100.0, 110.0), 0.5, [(100.0, 105.0)]),
+        ((110.0, 120.0), 0.5, [(110.0, 115.0)]),
+    ],
+)
+def test_a_share_is_granted_of_each_part_of_a_contact_within_and_behind_the_span(contact, share, parts):
+    whole = orbit.Contact(*contact, "Earth", "range")
+    seen = SimpleNamespace(contacts=(whole,), range_m=(np.cos,), duration_s=100.0, partner="relay")
+    found = flow._granted(seen, share)
+    assert [(c.start_s, c.end_s) for c, _ in found] == parts
+    assert all(range_m is np.cos and c.begins == "Earth" for c, range_m in found)
+    assert {c.ends for c, _ in found} == {"range" if share == 1.0 else "end of the relay's share"}
+    assert flow._of_span(tuple(c for c, _ in found), seen) == sum(start < 100.0 for start, _ in parts)
+
+
+SLOT = orbit.GeostationarySlot("GEO", orbit.Epoch("2026-03-20T12:00:00Z"), 0.3)
+LOW = orbit.KeplerOrbit("LEO", SLOT.epoch, EARTH_RADIUS_M + 500e3, 0.0, 1.7, 0.0, 0.0, 0.0, True)
+OFF_NADIR_RAD = math.asin(LOW.semi_major_axis_m / orbit.GEOSTATIONARY_RADIUS_M)
+
+
+@pytest.mark.parametrize(
+    ("low", "own", "far", "holds"),
+    [
+        ({}, {}, {}, True),
+        ({"eccentricity": 1e-6}, {}, {}, True),
+        ({"eccentricity": 2e-6}, {}, {}, False),
+        ({"semi_major_axis_m": orbit.GEOSTATIONARY_RADIUS_M}, {}, {}, False),
+        ({"semi_major_axis_m": 5e7}, {}, {}, False),
+        ({}, {"field_of_regard_rad": 3.14}, {}, False),
+        ({}, {}, {"field_of_regard_rad": OFF_NADIR_RAD}, True),
+        ({}, {}, {"field_of_regard_rad": OFF_NADIR_RAD - 1e-6}, False),
+    ],
+)
+def test_the_contact_by_hand_is_of_a_circle_below_the_slot_that_no_field_of_regard_cuts(low, own, far, holds):
+    pair = SimpleNamespace(
+        leo=SimpleNamespace(orbit=replace(LOW, **low), limits=replace(UNLIMITED, attitude="nadir", **own)),
+        geo=SimpleNamespace(orbit=SLOT, limits=replace(UNLIMITED, attitude="nadir", **far)),
+        earth=figure.Earth("sphere", 100e3),
+    )
+    found = geometry._closed_form(pair)
+    assert found == (orbit.coplanar_contact(LOW.semi_major_axis_m, 100e3) if holds else None)
+    pair.geo.orbit = LOW
+    assert geometry._closed_form(pair) is None
+    pair.leo.orbit, pair.geo.orbit = SLOT, SLOT
+    assert geometry._closed_form(pair) is None
+
+
+@pytest.mark.parametrize("node", [{"node": "30 deg"}, {"local_time": "10.5 h"}])
+def test_the_elements_of_a_mission_are_those_of_its_orbit(tmp_path, node):
+    table = {**{k: v for k, v in KEPLERIAN.items() if k != "node"}, **node, "mean_anomaly": "40 deg"}
+    m = day_file(tmp_path, ALONE, {"orbit.leo": table}).mission
+    own = orbit.pair(m.orbit, m.terminals, tmp_path).leo.orbit
+    degrees = [math.degrees(x) for x in (own.inclination_rad, own.argument_of_perigee_rad, own.mean_anomaly_rad)]
+    assert degrees == pytest.approx([97.4, 90.0, 40.0])
+    assert (own.semi_major_axis_m, own.eccentricity, own.j2) == (7e6, 0.001, True)
+    wanted = math.radians(30.0) if "node" in node else node_of_local_time(own.epoch, 10.5)
+    assert own.node_rad == pytest.approx(wanted)
+
+
+def test_a_circle_of_a_mission_begins_at_its_phase(tmp_path):
+    m = day_file(tmp_path, ALONE, {"orbit.leo.phase": "70 deg", "orbit.leo.gravity": "j2"}).mission
+    own = orbit.pair(m.orbit, m.terminals, tmp_path).leo.orbit
+    assert math.degrees(own.mean_anomaly_rad) == pytest.approx(70.0)
+    assert (own.eccentricity, own.argument_of_perigee_rad) == (0.0, 0.0)
+
+
+def test_limits_of_a_body_that_turns_to_its_partner_have_no_boresight_and_cut_nothing(tmp_path):
+    table = {"attitude": "free", "slew_limit": "2 deg/s", "sun_exclusion": "6 deg", "in_eclipse": False}
+    m = day_file(tmp_path, ALONE, {LIMITS: table}).mission
+    found = orbit.pair(m.orbit, m.terminals, tmp_path).leo.limits
+    assert (found.attitude, found.boresight, found.field_of_regard_rad) == ("free", UNLIMITED.boresight, math.pi)
+    assert math.degrees(found.slew_limit_rad_s) == pytest.approx(2.0)
+    assert (math.degrees(found.sun_exclusion_rad), found.in_eclipse) == (pytest.approx(6.0), False)

@@ -12,12 +12,13 @@ from microrad import link, orbit
 from microrad.link import study as link_study
 from microrad.orbit import Epoch, Station
 from microrad.orbit import day as day_study
-from microrad.orbit.day import PointingLoss, flow, geometry
+from microrad.orbit.day import PointingLoss, assumptions, flow, geometry
 from microrad.orbit.day.ground_track import ground_track
 from microrad.orbit.earth.figure import Earth, GroundSite
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
-from microrad.orbit.visibility.contacts import contacts, contacts_with_each, passes
+from microrad.orbit.visibility.contacts import coarse_step_s, contacts, contacts_with_each, passes
 from microrad.orbit.visibility.limits import UNLIMITED, Terminal
+from microrad.orbit.visibility.stations import StationRows, pass_spans
 from microrad.report.day.figures import ground_map
 
 DAY = (0.0, 86400.0)
@@ -109,6 +110,16 @@ def test_a_geostationary_satellite_is_seen_all_the_time_or_never():
     assert contacts(hidden, site(TEIDE), EARTH, EPOCH, DAY) == ()
 
 
+def test_passes_without_any_limit_of_the_range_are_those_with_none_that_counts():
+    rows, step = StationRows.of([TEIDE, KIRUNA], EPOCH), coarse_step_s(LOW, 0.0)
+    plain = pass_spans(LOW, rows, DAY, step)
+    for one, other in zip(plain, pass_spans(LOW, rows, DAY, step, [math.inf, math.inf]), strict=True):
+        np.testing.assert_array_equal(one, other)
+    near = pass_spans(LOW, rows, DAY, step, [1.0, math.inf])
+    assert (len(near[0]), len(near[1])) == (0, len(plain[1])) and len(plain[0]) > 0
+    assert pass_spans(LOW, StationRows.of([], EPOCH), DAY, step) == ()
+
+
 def test_a_range_cuts_a_pass_short():
     whole = contacts(free(LOW), site(TEIDE), EARTH, EPOCH, DAY)
     (cut,) = contacts_with_each(free(LOW), (site(TEIDE),), EARTH, EPOCH, DAY, furthest_m=800e3)
@@ -173,6 +184,31 @@ def test_how_far_each_rate_reaches_is_where_it_has_lost_what_it_had_to_spare(tmp
     assert reach[1e9] > reach[10e9] > data.range_m > reach[120e9] > reach[300e9] > nearest > reach[1e13]
     # of a rate that is 10 dB slower the reach is sqrt(10) times as far, behind the budget's elevation
     assert reach[1e9] / reach[10e9] == pytest.approx(math.sqrt(10.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("path", [None, SimpleNamespace(satellite_radius_m=None)])
+@pytest.mark.parametrize(("spare_db", "reach_m"), [(-20.0, 4e6), (0.0, 4e7), (20.0, 4e8)])
+def test_without_a_satellite_over_it_a_link_reaches_as_far_as_its_light_spreads(path, spare_db, reach_m):
+    data = SimpleNamespace(range_m=4e7, shared=SimpleNamespace(path=path))
+    assert flow._reach_m(data, spare_db) == pytest.approx(reach_m, rel=1e-12)
+
+
+def test_what_a_link_on_the_ground_has_to_assume_is_said_of_its_own_ends(tmp_path):
+    """The satellite of a station is not called a relay, and what stands on the ground has no attitude."""
+
+    def changes_of(changes, **more):
+        m = ground_file(tmp_path, changes, more).mission
+        own = assumptions.Case(m.operations, m.orbit, link.of(m), PointingLoss(1.0, 0.01, "stated"))
+        return {name: sides for name, *sides in assumptions._changes(own, None)}
+
+    down, up = changes_of({}), changes_of(UP)
+    assert "share of each contact that the station grants" in down
+    assert "share of each contact that the satellite grants" in up
+    (text, held), _ = down["attitude of the satellite"]
+    assert text == "nadir, 60 deg about nadir"
+    assert held.orbits.leo.limits.boresight == (0.0, 0.0, 1.0)
+    assert not up.keys() & {"attitude of the satellite", "eclipse", "orbit altitude"}
+    assert not (down.keys() | up.keys()) & {"grazing height", "time of acquisition"}
 
 
 def test_in_still_air_the_reach_grows_with_the_elevation_too(tmp_path):

@@ -26,6 +26,7 @@ from microrad.orbit.operations import (
     deliver,
     pool,
     service,
+    store,
 )
 
 KM = 1e3
@@ -116,6 +117,12 @@ def test_the_service_agrees_with_the_table_second_by_second(limits_km, start_s, 
     assert np.all(np.diff(got.rate_bit_s) != 0.0)
 
 
+def test_a_contact_of_no_more_than_the_rounding_of_its_times_has_one_rate():
+    start_s, end_s = 1e9, 1e9 + 4e-7
+    got = service(RateTable((Step(2 * GBIT, 40_000 * KM), Step(1 * GBIT, INF))), (start_s, end_s), swing, 1.0)
+    assert (got.edges_s.tolist(), got.rate_bit_s.size) == ([start_s, end_s], 1)
+
+
 @pytest.mark.parametrize("largest", [-5.0, math.nan])
 def test_a_rate_without_a_range_is_refused(largest):
     words = f"the largest range of step 1 is {largest:g} m; give at least 0 m, inf allowed"
@@ -192,6 +199,17 @@ def test_a_full_store_loses_the_newest_and_takes_in_what_the_link_takes_out():
     assert latency.cdf(23.0 - 1e-6) == pytest.approx(80.0 / 280.0, abs=1e-6)
     # 200 bit of 20 s leaves at 63 s, the next of 40 s at 63 s: 23 s, falling to 5 s
     assert latency.quantile(1e-9) == pytest.approx(5.0, abs=1e-6)
+
+
+def test_a_store_that_fills_within_the_rounding_of_a_moment_fills_at_that_moment():
+    room = math.nextafter(1e9, INF)
+    time, stored, kept, lost = store._march(
+        np.array([0.0, 1e9, 1e9 + 1.0]), np.array([1.0, 10.0]), np.array([0.0, 0.0]), room
+    )
+    assert time.tolist() == [0.0, 1e9, 1e9 + 1.0]
+    assert stored.tolist() == [0.0, room, room]
+    assert kept.tolist() == [0.0, 1e9, 1e9]
+    assert lost.tolist() == [0.0, 0.0, 10.0]
 
 
 @pytest.mark.promise("day-23")

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from day_files import ALONE, KIRUNA, day_file
-from microrad import orbit
+from microrad import link, orbit
 from microrad.link import study as link_study
 from microrad.orbit import day as day_study
 from microrad.orbit import operations
-from microrad.orbit.day import flow, network
+from microrad.orbit.day import PointingLoss, assumptions, flow, network
 from microrad.orbit.day import weather as skies
 from microrad.report import registry
 from microrad.report.day.data import day_csv, day_data
@@ -318,3 +318,12 @@ def test_the_stations_of_a_network_may_stand_where_the_radios_do(tmp_path):
     )
     o = both.mission.operations
     assert orbit.stations(o.optical) == orbit.stations(o.downlink)
+
+
+def test_clouds_of_a_network_that_know_nothing_of_each_other_are_tied_by_500_km(tmp_path):
+    for length, low, high in (("0 km", None, "500 km"), ("300 km", "none", "600 km")):
+        m = day_file(tmp_path, optical(0.5, correlation_length=length)).mission
+        own = assumptions.Case(m.operations, m.orbit, link.of(m), PointingLoss(1.0, 0.01, "stated"))
+        sides = next(s for name, *s in assumptions._changes(own, None) if name == "correlation length of clouds")
+        assert [None if side is None else side[0] for side in sides] == [low, high]
+        assert sides[1][1].operations.optical.correlation_length_m == pytest.approx(float(high.split()[0]) * 1e3)

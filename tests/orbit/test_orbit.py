@@ -77,6 +77,9 @@ def wrapped(angle):
         ("2026-03-20 12:00:00.2500+00:00", "2026-03-20T12:00:00.25Z"),
         ("2026-03-20T12:00:30.000Z", "2026-03-20T12:00:30Z"),
         ("2016-12-31T23:59:60.5Z", "2016-12-31T23:59:60.5Z"),
+        ("2026-03-20T23:59:59.5+0000", "2026-03-20T23:59:59.5Z"),
+        ("1973-01-02T00:00:00Z", "1973-01-02T00:00:00Z"),
+        ("2050-12-31T23:59:59Z", "2050-12-31T23:59:59Z"),
     ],
 )
 def test_an_instant_is_brought_to_one_form(text, normal):
@@ -100,6 +103,11 @@ def test_an_instant_is_brought_to_one_form(text, normal):
         ("2026-03-20T12:00:60Z", "names no time of the day"),
         ("2026-03-20T23:59:60Z", "none was inserted"),
         ("2016-12-31T23:59:61Z", "names no time of the day"),
+        ("2026-03-20T12:60:00Z", "names no time of the day"),
+        ("2016-12-31T23:58:60Z", "names no time of the day"),
+        ("2016-12-31T22:59:60Z", "names no time of the day"),
+        ("2026-03-20T12:00:00-0000", "has no time zone"),
+        ("1973-01-01T23:59:59Z", "outside 1973-01-02 to 2050-12-31"),
         ("1972-06-01T00:00:00Z", "outside 1973-01-02 to 2050-12-31"),
         ("2051-01-01T00:00:00Z", "outside 1973-01-02 to 2050-12-31"),
     ],
@@ -344,6 +352,12 @@ def test_a_terminal_below_the_surface_is_refused_with_its_depth():
         SPHERE.clearance_rad(np.array([[math.nan], [0.0], [0.0]]), r[:, :1])
 
 
+def test_a_terminal_on_the_surface_itself_is_over_it():
+    on, over = np.array([[RE], [0.0], [0.0]]), np.array([[2.0 * RE], [0.0], [0.0]])
+    assert SPHERE.clearance_rad(on, over)[0] == pytest.approx(math.pi / 3.0)
+    assert SPHERE.clearance_rad(over, on)[0] == pytest.approx(math.pi / 3.0)
+
+
 def test_a_surface_that_is_none_is_refused():
     with pytest.raises(OrbitError, match="'flat' is not known; write oblate or sphere"):
         earth.Earth("flat", 0.0)
@@ -428,6 +442,13 @@ def test_day_is_never_night_and_the_shadow_ends_where_its_cone_does():
         sun.shadow_rad(6e6 * light, light, "sphere")
     with pytest.raises(OrbitError, match=r"sample 1 is at 0\.5\d* Earth radii"):  # the deepest
         sun.shadow_rad(np.array([[6e6, 3.5e6, 9e6]]) * light, np.repeat(light, 3, axis=1), "sphere")
+
+
+def test_on_the_ground_below_the_sun_it_is_day_and_opposite_it_is_night():
+    light = np.array([[1.0], [0.0], [0.0]])
+    ground = np.array([[RE], [0.0], [0.0]])
+    assert sun.shadow_rad(ground, light, "sphere")[0] == pytest.approx(-math.pi / 2.0, abs=5e-3)
+    assert sun.shadow_rad(-ground, light, "sphere")[0] == pytest.approx(math.pi / 2.0, abs=5e-3)
 
 
 def test_the_sun_is_as_wide_as_the_almanac_says():
@@ -627,11 +648,12 @@ def test_a_sun_synchronous_node_goes_round_once_in_a_tropical_year(altitude_m, e
 
 def test_an_altitude_or_eccentricity_without_a_sun_synchronous_orbit_is_refused():
     analytic.sun_synchronous_inclination_rad(5974e3)
-    for altitude in (5975e3, -7e6, math.nan):
+    for altitude in (5975e3, -7e6, -RE, math.nan):
         with pytest.raises(OrbitError, match="can be sun-synchronous"):
             analytic.sun_synchronous_inclination_rad(altitude)
-    with pytest.raises(OrbitError, match="eccentricity 1"):
-        analytic.sun_synchronous_inclination_rad(500e3, 1.0)
+    for eccentricity in (1.0, 1.5, -1e-9, math.nan):
+        with pytest.raises(OrbitError, match=f"eccentricity {eccentricity:.6g} is not from 0"):
+            analytic.sun_synchronous_inclination_rad(500e3, eccentricity)
 
 
 @pytest.mark.promise("day-8")
@@ -653,8 +675,9 @@ def test_a_node_of_local_time_stays_at_its_hour_from_the_mean_sun(hours):
 def test_a_node_of_noon_is_at_the_longitude_where_it_is_noon():
     node = analytic.node_of_local_time(START, 12.0)
     assert node == pytest.approx(float(START.earth_rotation_rad(0.0)) % (2.0 * math.pi))
-    with pytest.raises(OrbitError, match="a local time of 24 h"):
-        analytic.node_of_local_time(START, 24.0)
+    for hours in (24.0, -0.1, math.nan):
+        with pytest.raises(OrbitError, match=f"a local time of {hours:.6g} h is not from 0 to below 24"):
+            analytic.node_of_local_time(START, hours)
 
 
 # ---- the low satellite and the slot

@@ -1120,3 +1120,220 @@ def test_a_name_before_two_lines_is_any_that_is_no_line_itself(tmp_path, name):
 )
 def test_a_name_that_may_be_a_line_is_taken_for_one(tmp_path, name, words):
     refused(tmp_path, f"{name}\n{LINE_1}\n{LINE_2}", "line 1", words)
+
+
+# -------------------------------------------------------------------------------------- the notations, the other way
+def test_a_catalogue_number_of_noughts_is_0_in_each_notation(tmp_path):
+    lines = f"{edited(LINE_1, 3, '00000')}\n{edited(LINE_2, 3, '00000')}"
+    (found,) = elements(tmp_path, lines)
+    assert (found.name, found.catalogue_number) == ("0", "0")
+    (found,) = elements(tmp_path, kvn({**FIELDS, "NORAD_CAT_ID": "000"}))
+    assert found.catalogue_number == "0"
+    for asked in ("0", "000", " 0 "):
+        assert elements(tmp_path, lines + "\n" + NAMED, asked)[0].catalogue_number == "0"
+
+
+def test_a_name_is_asked_for_whatever_its_capitals_and_the_blanks_about_it(tmp_path):
+    for asked in (" Example 1 ", "EXAMPLE 1", " 90001"):
+        assert [e.name for e in elements(tmp_path, NAMED, asked)] == ["EXAMPLE 1"]
+
+
+@pytest.mark.parametrize("notation", ["kvn", "json", "csv"])
+def test_empty_lines_before_a_message_are_passed_over(tmp_path, notation):
+    plain = elements(tmp_path, NOTATIONS[notation](FIELDS))[0]
+    (found,) = elements(tmp_path, "\n\n" + NOTATIONS[notation](FIELDS))
+    assert replace(found, place="") == replace(plain, place="")
+
+
+def test_a_message_that_begins_with_a_comment_is_one(tmp_path):
+    (found,) = elements(tmp_path, "COMMENT of nothing\n" + kvn(FIELDS))
+    assert found.name == "EXAMPLE 1"
+
+
+def test_a_first_line_of_five_commas_is_a_table_and_one_of_four_a_name(tmp_path):
+    name = "ONE, TWO, THREE, FOUR, FIVE"
+    assert elements(tmp_path, f"{name}\n{LINE_1}\n{LINE_2}")[0].name == name
+    refused(tmp_path, f"{name}, SIX\n{LINE_1}\n{LINE_2}", "line 2: 1 values, but the first line names 6 columns")
+
+
+@pytest.mark.parametrize("notation", ["kvn", "xml", "json", "csv"])
+def test_a_message_without_the_type_of_its_ephemeris_is_of_sgp4(tmp_path, notation):
+    write_in = NOTATIONS[notation]
+    plain = elements(tmp_path, write_in(FIELDS))[0]
+    without = {key: value for key, value in FIELDS.items() if key != "EPHEMERIS_TYPE"}
+    assert replace(elements(tmp_path, write_in(without))[0], place="") == replace(plain, place="")
+
+
+def test_values_of_json_that_are_no_words_or_numbers_are_absent(tmp_path):
+    (found,) = elements(tmp_path, json.dumps([{**FIELDS, "RCS_SIZE": None, "TAGS": ["a"], "ACTIVE": True}]))
+    assert found.name == "EXAMPLE 1"
+    for none in (None, True, ["1"]):
+        refused(tmp_path, json.dumps([{**FIELDS, "BSTAR": none}]), "entry 1: BSTAR is missing")
+
+
+def test_keys_of_the_tables_may_be_in_small_letters(tmp_path):
+    small = {key.lower(): value for key, value in FIELDS.items()}
+    assert elements(tmp_path, json.dumps(small))[0].name == "EXAMPLE 1"
+    head, rest = comma(FIELDS).split("\n", 1)
+    assert elements(tmp_path, f" {head.lower()}\n\n{rest}")[0].name == "EXAMPLE 1"
+
+
+def test_comments_and_keys_of_the_users_own_may_stand_twice(tmp_path):
+    own = kvn(FIELDS) + "USER_DEFINED_A = 1\nUSER_DEFINED_A = 2\n"
+    commented = xml(FIELDS).replace("<metadata>", "<metadata><COMMENT>one</COMMENT><COMMENT>two</COMMENT>")
+    for text in (own, commented):
+        assert elements(tmp_path, text)[0].name == "EXAMPLE 1"
+    text = oem_xml(GRID).replace("<metadata>", "<metadata><COMMENT>one</COMMENT><COMMENT>two</COMMENT>")
+    assert ephemeris(tmp_path, text).name == "EXAMPLE 1"
+
+
+@pytest.mark.parametrize(("length", "shown"), [(60, "9" * 60), (61, "9" * 57 + "...")])
+def test_a_value_of_60_letters_is_shown_whole_and_a_longer_one_cut(tmp_path, length, shown):
+    refused(tmp_path, as_json({**FIELDS, "EPOCH": "9" * length}), f"EPOCH is '{shown}', not a date")
+
+
+@pytest.mark.parametrize("read_already", [False, True])
+def test_a_file_of_the_largest_size_is_read_and_a_byte_more_is_not(tmp_path, monkeypatch, read_already):
+    path = write(tmp_path, NAMED)
+    data = NAMED.encode() if read_already else None
+    monkeypatch.setattr(messages, "MOST_BYTES", len(NAMED))
+    assert read_elements(path, data=data)[0].name == "EXAMPLE 1"
+    monkeypatch.setattr(messages, "MOST_BYTES", len(NAMED) - 1)
+    with pytest.raises(OrbitError, match="keep only the satellites"):
+        read_elements(path, data=data)
+
+
+def test_a_line_of_keywords_may_have_a_thousand_letters(tmp_path):
+    line = "USER_DEFINED_A = "
+    assert elements(tmp_path, kvn(FIELDS) + line.ljust(1000, "x") + "\n")
+    refused(tmp_path, kvn(FIELDS) + line.ljust(1001, "x") + "\n", "is neither 'KEY = value'")
+
+
+def test_a_keyword_without_a_value_is_missing(tmp_path):
+    refused(tmp_path, kvn({**FIELDS, "EPOCH": ""}), "line 1: EPOCH is missing in this mean-elements message")
+
+
+@pytest.mark.parametrize("block", [1, 7, len(xml(FIELDS)), len(xml(FIELDS)) - 1, len(xml(FIELDS)) + 1])
+def test_xml_is_the_same_in_any_pieces(tmp_path, monkeypatch, block):
+    (plain,) = elements(tmp_path, xml(FIELDS))
+    monkeypatch.setattr(messages, "_BLOCK", block)
+    assert elements(tmp_path, xml(FIELDS)) == (plain,)
+    refused(tmp_path, xml(FIELDS)[:-3], "not well-formed XML")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("2026-03-20T12:34:56.5", (739695, 45296.5)),
+        ("2026-079T12:34:56", None),
+        ("2026-03-20T23:59:59.999", (739695, 86399.999)),
+        ("2026-03-20T12:34:60", None),
+        ("2026-03-20T24:00:00", None),
+        ("2026-03-20 12:34:56", None),
+        ("2026-03-20T12:34x56", None),
+        ("2026-03-20T12:34", None),
+        ("2026-03-20T12:34:\uff15\uff16", None),
+        ("2026-03-20T12:34:5.6.7", None),
+        ("2026-03-20T12:34:-5", None),
+        ("2026-02-29T12:34:56", None),
+    ],
+)
+def test_the_quick_way_to_read_a_time_takes_the_plain_form_alone(text, found):
+    assert messages.plain_instant(text) == found
+
+
+@pytest.mark.parametrize("time", ["2026-03-20T12:04x00", "2026-03-20T12:04:\uff10\uff10", "2026-03-20T12:04"])
+def test_a_time_of_a_state_vector_that_is_almost_plain_is_refused(tmp_path, time):
+    no_ephemeris(tmp_path, with_word(4, 0, time), "line 20", f"'{time}', not a date and time")
+
+
+def test_a_year_has_no_day_0(tmp_path):
+    words = "day 000.50000000 of 2026, is refused: the day of the year must be from 1 to 366"
+    refused(tmp_path, f"{edited(LINE_1, 21, '000')}\n{LINE_2}", words)
+
+
+def test_years_of_two_digits_are_of_the_last_century_from_57_on(tmp_path):
+    for year, full in (("56", 2056), ("57", 1957)):
+        refused(tmp_path, f"{edited(LINE_1, 19, year)}\n{LINE_2}", f"of {full}, is refused")
+
+
+@pytest.mark.parametrize(
+    ("count", "method"),
+    [(4, ()), (2, (("INTERPOLATION", "HERMITE"), ("INTERPOLATION_DEGREE", "3"))), (8, LAGRANGE)],
+    ids=["default", "hermite", "lagrange"],
+)
+def test_as_many_state_vectors_as_the_interpolation_takes_are_enough(tmp_path, count, method):
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID[:count], **dict(method)))
+    assert orbit.span_s == (0.0, GRID[count - 1])
+    words = f"{count - 1} state vectors in this segment, too few", f"which takes {count}"
+    no_ephemeris(tmp_path, HEAD + segment(GRID[: count - 1], **dict(method)), *words)
+
+
+@pytest.mark.parametrize("method", ["HERMITE", "LAGRANGE"])
+def test_degrees_of_interpolation_go_from_3_to_25(tmp_path, method):
+    for degree in ("3", "25"):
+        ephemeris(tmp_path, HEAD + segment(GRID, INTERPOLATION=method, INTERPOLATION_DEGREE=degree))
+    for degree in ("2", "26"):
+        text = HEAD + segment(GRID, INTERPOLATION=method, INTERPOLATION_DEGREE=degree)
+        no_ephemeris(tmp_path, text, f"INTERPOLATION_DEGREE is '{degree}'; take a whole number from 3 to 25")
+
+
+def test_a_degree_without_a_method_is_of_hermite(tmp_path):
+    (segment_of,) = ephemeris(tmp_path, HEAD + segment(GRID, INTERPOLATION_DEGREE="5")).segments
+    assert (segment_of.method, segment_of.points) == ("HERMITE", 3)
+
+
+@pytest.mark.parametrize(("first", "last"), [(600, 600), (6000, 6100), (-60, 0)])
+def test_a_usable_span_of_one_instant_is_none(tmp_path, first, last):
+    text = HEAD + segment(GRID, USEABLE_START_TIME=stamp(first), USEABLE_STOP_TIME=stamp(last))
+    no_ephemeris(tmp_path, text, "has nothing in common with the state vectors", "correct USEABLE_START_TIME and")
+
+
+def test_times_may_miss_the_ends_of_an_ephemeris_by_their_rounding(tmp_path):
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID))
+    orbit.require(-5e-7, 6000.0 + 5e-7)
+    at_ends = orbit.states(np.array([-5e-7, 6000.0 + 5e-7]))
+    np.testing.assert_array_equal(at_ends.position_m, orbit.states(np.array([0.0, 6000.0])).position_m)
+    for start, end in ((-2e-6, 6000.0), (0.0, 6000.0 + 2e-6)):
+        with pytest.raises(OrbitError, match="nothing is extrapolated"):
+            orbit.require(start, end)
+        with pytest.raises(OrbitError, match="nothing is extrapolated"):
+            orbit.states(np.array([start, end]))
+
+
+@pytest.mark.parametrize(("count", "more"), [(4, ""), (5, " and 1 more"), (6, " and 2 more")])
+def test_four_segments_are_listed_and_the_others_counted(tmp_path, count, more):
+    text = HEAD + "".join(segment(1200.0 * k + GRID[:6]) for k in range(count))
+    with pytest.raises(OrbitError) as caught:
+        ephemeris(tmp_path, text).require(0.0, 7200.0)
+    last = "2026-03-20T13:00:00.000Z to 2026-03-20T13:05:00.000Z"
+    assert f"{last}{more}, and the mission needs 2026-03-20T12:00:00.000Z to 2026-03-20T14" in str(caught.value)
+
+
+def test_segments_apart_by_less_than_the_rounding_of_times_hold_as_one(tmp_path):
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID[:6]) + segment(300.0 + GRID[:6]))
+    for apart_s, held in ((5e-7, True), (2e-6, False)):
+        moved = replace(orbit, segments=(orbit.segments[0], replace(orbit.segments[1], start_s=300.0 + apart_s)))
+        if held:
+            moved.require(0.0, 600.0)
+        else:
+            with pytest.raises(OrbitError, match="nothing is extrapolated"):
+                moved.require(0.0, 600.0)
+
+
+@pytest.mark.parametrize(("count", "others"), [(8, "EXAMPLE 7 (90007); name one"), (9, "(90007) and others; name one")])
+def test_eight_satellites_are_listed(tmp_path, count, others):
+    with pytest.raises(OrbitError, match=f"{count} element sets of different satellites, EXAMPLE 0") as caught:
+        closest_elements(elements(tmp_path, catalogue(count)), EPOCH)
+    assert others in str(caught.value)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_elements_hold_for_fourteen_days_to_the_end(tmp_path, sign):
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    limit = sign * 14 * 86400.0
+    orbit.require(min(0.0, limit), max(0.0, limit))
+    assert np.all(np.isfinite(orbit.states(limit).position_m))
+    state, which = ("expired", "newer") if sign > 0 else ("not valid yet", "older")
+    with pytest.raises(OrbitError, match=rf"the elements are {state}: .* 14\.00 days .* take {which} elements"):
+        orbit.states(np.array([0.0, limit + sign * 1e-3]))

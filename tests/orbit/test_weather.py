@@ -172,6 +172,8 @@ def test_months_of_a_span_by_the_calendar():
     assert begins == [(0.0, 11), (16 * 86400.0, 12), (47 * 86400.0, 1), (78 * 86400.0, 2)]
     later = skies.months(orbit.Epoch("2027-11-15T00:00:00Z"), (20 * 86400.0, 47 * 86400.0))
     assert later == [(20 * 86400.0, 12)]
+    from_the_first = skies.months(orbit.Epoch("2027-11-15T00:00:00Z"), (16 * 86400.0, 47 * 86400.0 + 1.0))
+    assert from_the_first == [(16 * 86400.0, 12), (47 * 86400.0, 1)]
 
 
 def test_the_last_month_of_the_tables_has_no_next_one():
@@ -213,6 +215,14 @@ def test_one_variable_twice_counts_once():
     same = np.ones((2, 2))
     assert skies.normal_below(np.array([0.3, 0.3]), same) == pytest.approx(multivariate_normal.cdf(0.3), abs=2e-4)
     assert skies.normal_below(np.array([0.3, 2.0]), same) == pytest.approx(multivariate_normal.cdf(0.3), abs=2e-4)
+
+
+def test_one_variable_twice_beside_another_counts_once():
+    pair = np.array([[1.0, 0.5], [0.5, 1.0]])
+    same = np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.5, 0.5, 1.0]])
+    two = skies.normal_below(np.array([0.3, 1.0]), pair)
+    assert skies.normal_below(np.array([0.3, 0.3, 1.0]), same) == pytest.approx(two, abs=2e-4)
+    np.testing.assert_allclose(skies._factor(same)[2], [0.5, 0.0, math.sqrt(0.75)], atol=1e-12)
 
 
 def test_independent_sites_leave_the_product_of_their_clouds():

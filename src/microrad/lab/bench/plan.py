@@ -49,7 +49,7 @@ class _Choices(Quantity):
 
     def read(self, value: object) -> Any:
         items = value if isinstance(value, list | tuple) else []
-        known = all(item in FORMATS for item in items)
+        known = all(isinstance(item, str) and item in FORMATS for item in items)
         if not items or not known or len(set(items)) < len(items):
             raise UnitError("formats", "is no list of different file formats", self.wanted, self.example)
         return tuple(items)

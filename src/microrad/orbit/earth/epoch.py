@@ -144,7 +144,9 @@ def _normal(text: str) -> str:
     except ValueError as error:
         raise OrbitError(f"{text!r} names no day of the calendar ({error}); {_EXAMPLE}") from None
     _check_day(day, repr(text))
-    second = (match[6] or "00").rstrip("0").rstrip(".") if "." in (match[6] or "") else match[6] or "00"
+    second = match[6] or "00"
+    if "." in second:
+        second = second.rstrip("0").rstrip(".")
     _check_clock(text, day, int(match[4]), int(match[5]), float(second))
     return f"{match[1]}-{match[2]}-{match[3]}T{match[4]}:{match[5]}:{second}Z"
 

@@ -164,9 +164,10 @@ def sun_synchronous_inclination_rad(altitude_m: float, eccentricity: float = 0.0
         raise OrbitError(f"the eccentricity {eccentricity:.6g} is not from 0 to below 1; check the elements")
     axis_m = EARTH_RADIUS_M + altitude_m
     parameter_m = axis_m * (1.0 - eccentricity**2)
-    motion = math.sqrt(MU_M3_S2 / axis_m**3) if axis_m > 0.0 else math.nan
-    wanted = 2.0 * math.pi / TROPICAL_YEAR_S
-    cosine = -wanted / (1.5 * J2 * (EARTH_RADIUS_M / parameter_m) ** 2 * motion)
+    wanted, cosine = 2.0 * math.pi / TROPICAL_YEAR_S, math.nan
+    if axis_m > 0.0:
+        motion = math.sqrt(MU_M3_S2 / axis_m**3)
+        cosine = -wanted / (1.5 * J2 * (EARTH_RADIUS_M / parameter_m) ** 2 * motion)
     if not cosine >= -1.0:
         raise OrbitError(
             f"no orbit {altitude_m / 1e3:.6g} km over the equator can be sun-synchronous: the flattening turns its "
