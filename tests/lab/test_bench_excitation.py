@@ -159,6 +159,13 @@ def test_a_staircase_holds_its_levels_and_ramps_between_them():
     assert slew(steps) == pytest.approx(6.0 / 0.005)
 
 
+@pytest.mark.parametrize(("dwell_s", "samples"), [(0.3e-3, 3), (0.26e-3, 3), (0.24e-3, 2), (0.06e-3, 1)])
+def test_a_level_lasts_as_many_samples_as_are_nearest_to_its_dwell(dwell_s, samples):
+    steps = staircase(LIMITS, levels_v=[6.0, 9.0], dwell_s=dwell_s, rise_s=0.01)
+    assert steps.step_samples == (samples + 100,)
+    assert steps.drive.shape[0] == 2 * samples + 101
+
+
 @pytest.mark.promise("bench-8")
 def test_only_the_chosen_axis_moves():
     drive = growing_sines(two_inputs(), freq_hz=50.0, amplitudes_v=[2.0], periods=2, offset_v=5.0, axis=1).drive

@@ -29,6 +29,7 @@ from microrad.loop.disturbance import (
     first_order,
     fit_bands,
     fit_table,
+    fits,
     initial_state,
     olympus,
     one_input,
@@ -345,6 +346,22 @@ def test_the_micius_bands_are_met_with_one_white_input(convention, part):
     assert 0.0 < above < 0.35 * part * 0.6 * URAD
     assert fit.disturbance.B.shape[1] == 1
     assert "8.6 µrad for 8.6 µrad" in fit.disturbance.basis or convention == "radial"
+
+
+def test_the_broadest_terms_that_meet_the_bands_are_taken(monkeypatch):
+    asked, fit_terms = [], fits.fit_terms
+
+    def looked(samples, limits, least_damping, **options):
+        asked.append(least_damping)
+        return fit_terms(samples, limits, least_damping, **options)
+
+    monkeypatch.setattr(fits, "fit_terms", looked)
+    fit_bands((1, 10, 100), (1e-6, 1e-6), convention="per-axis")
+    assert asked == [0.5]
+    asked.clear()
+    with pytest.raises(ValueError, match="5 % is allowed"):
+        fit_bands((0, 1, 2, 3), (1e-5, 1e-7, 1e-5), convention="radial")
+    assert asked == [0.5, 0.3, 0.1, 0.05]
 
 
 @pytest.mark.parametrize(

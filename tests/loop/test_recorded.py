@@ -151,6 +151,15 @@ def test_a_narrow_resonance_and_noise_are_no_lines():
     assert find_lines(recorded_motion(drawn(1000.0, 40.0, 6, ()), 1e-3).rest_rad, 1e-3)[0] == ()
 
 
+def test_a_line_is_found_behind_a_stronger_peak_that_is_none():
+    time = np.arange(40_000) / 1e3
+    noise = np.random.default_rng(5).normal(0.0, 1e-6, time.size)
+    burst = np.where(time < 20.0, 3e-6 * np.sin(2 * np.pi * 40.0 * time), 0.0)
+    (line,), _ = find_lines(noise + burst + 0.3e-6 * np.sin(2 * np.pi * 123.0 * time), 1e-3)
+    assert line.freq_hz == pytest.approx(123.0, abs=0.01)
+    assert line.amplitude_rad == pytest.approx(0.3e-6, rel=0.1)
+
+
 @pytest.mark.promise("pointing-67", "pointing-68")
 def test_a_burst_is_said_not_to_be_stationary_and_what_the_loop_leaves_in_it():
     samples = drawn(1600.0, 15.0, 7, ())

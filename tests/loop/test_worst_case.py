@@ -206,6 +206,22 @@ def test_of_many_parameters_those_are_moved_one_by_one_that_matter_to_first_orde
     assert (all_of_them.corners, two.corners) == (8, 4)
 
 
+def test_the_sensitivity_to_a_parameter_is_the_larger_change_of_the_two_ways(file):
+    subject, axis = subject_of(file)
+    found = worst_case.worst_case(subject, 1, INDICES, replace(SMALL, draws=1))
+
+    def figures(factors):
+        rms, modulus = by_itself(subject, axis, from_table(spread.moved(file.mission.mirror, factors)))
+        return np.array([*rms, modulus])
+
+    own, errors = figures(np.ones(3)), np.diag([0.02, 0.03, 0.1])
+    for each in found.most_sensitive:
+        error = errors[PARAMETERS.index(each.parameter)]
+        up, down = (np.abs(figures(1.0 + sign * error) / own - 1.0) for sign in (1.0, -1.0))
+        assert not np.allclose(up, down, rtol=0.01)
+        assert_allclose([*each.rms, each.modulus], np.maximum(up, down), rtol=1e-6)
+
+
 @pytest.mark.promise("pointing-73")
 def test_draws_are_those_that_designs_have_to_hold_for(file):
     table = file.mission.mirror
