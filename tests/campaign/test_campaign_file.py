@@ -1101,6 +1101,13 @@ def test_a_list_that_scales_together_is_one_column(tmp_path):
         CampaignError, match=r"mirror\.linear\.pole_dampings = \[1\.25, 0\.625\] item 1: 1\.25 is above 1"
     ):
         MissionBuilder(c).mission(0, {"mirror.linear.pole_dampings": 2.5})
+    creep = text.replace('"linear.poles"', '"creep.weights"').replace(
+        "\n[uncertainty]",
+        '\n[creep]\ntime_constants = ["1 s", "9 s"]\nweights = ["2 urad/V", "1e-6 rad/V"]\n\n[uncertainty]',
+    )
+    (tmp_path / "mirror.toml").write_text(creep, encoding="utf-8")
+    m = MissionBuilder(load_campaign(path)).mission(0, {"mirror.creep.weights": 1.5}).mission
+    assert m.mirror.creep.weights_rad_v == pytest.approx((3e-6, 1.5e-6), rel=1e-12)
 
 
 # ---------------------------------------------------------------------------------------------------------- same loop?

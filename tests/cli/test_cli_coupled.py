@@ -294,7 +294,14 @@ def test_what_means_nothing_for_several_channels(refused, folder, quick, options
 @pytest.mark.promise("recordings-1")
 def test_options_beside_a_list_are_refused(refused, folder):
     (folder / "list.toml").write_text("[recording.a]\nfile = 'a.npz'\n")
-    for option in (["--input", "u"], ["--output-file", "y.npy"], ["--rate", "2 kHz"], ["--lever-arm", "1 mm"]):
+    for option in (
+        ["--input", "u"],
+        ["--output-file", "y.npy"],
+        ["--rate", "2 kHz"],
+        ["--lever-arm", "1 mm"],
+        ["--input-unit", "mV"],
+        ["--output-unit", "urad"],
+    ):
         message = refused("identify", "list.toml", *option)
         assert f"list.toml is a list of recordings and {option[0]} is for files: write it into the list" in message
     message = refused("identify", table(folder), "list.toml", "--input", 1, "--output", 3)

@@ -106,6 +106,17 @@ def test_what_is_tuned_again_is_tuned_for_the_larger_margin_and_with_the_same_pl
     assert (made.name, made.controller) == ("LQG", ("LQG", scene, ("axis", best)))
 
 
+@pytest.mark.parametrize(("name", "tunes"), [(designs.BASELINE, "grid_baseline"), (control.PI.name, "tune")])
+def test_every_plant_that_a_design_has_to_hold_for_is_tuned_on(file, scene, monkeypatch, name, tunes):
+    asked = []
+    monkeypatch.setattr(designs, "grid_baseline", lambda of, wanted: asked.append(("grid_baseline", of, wanted)))
+    monkeypatch.setattr(control, "tune", lambda family, of, wanted, seed: asked.append(("tune", of, wanted)))
+    table = file.mission.fine_pointing
+    plants = [object(), object(), object()]
+    designs._tuning(name, table, plants)()
+    assert asked == [(tunes, plants, control.Specification(table.modulus_margin))]
+
+
 @pytest.mark.parametrize(("speed_hz", "lines"), [(999.0, (999.0, 1998.0)), (1000.0, (1000.0,)), (2000.0, ())])
 def test_peaks_stand_at_the_lines_of_the_wheels_below_two_fifths_of_the_rate(file, monkeypatch, speed_hz, lines):
     """At a control rate of 5 kHz up to 2 kHz; a loop without wheels, or without lines there, has none."""

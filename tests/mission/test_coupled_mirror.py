@@ -715,6 +715,7 @@ def test_a_matrix_has_so_many_rows_and_no_more(monkeypatch):
     monkeypatch.setattr(coupled_parts, "_MANY", 3)
     rule = coupled_parts._Matrix(Quantity(""))
     assert rule.read([[1.0], [2.0], [3.0]]) == ((1.0,), (2.0,), (3.0,))
+    assert [type(item) for row in rule.read([[1, 2], [3, 4]]) for item in row] == [float] * 4
     with pytest.raises(ProblemsError) as refused:
         rule.read([[1.0]] * 4)
     assert [(p.reason, p.expected) for p in refused.value.problems] == [("has 4 rows", "at most 3 rows")]
