@@ -352,7 +352,9 @@ def test_verify_finds_a_flipped_bit_and_resume_mends_it(there, call):
 
 # --------------------------------------------------------------------------------------------------- export and report
 @pytest.mark.promise("campaigns-2")
-@pytest.mark.parametrize(("name", "begins"), [("r.csv", b"cell,"), ("r.parquet", b"PAR1"), ("r.nc", b"\x89HDF")])
+@pytest.mark.parametrize(
+    ("name", "begins"), [("r.csv", b"cell,"), ("R.CSV", b"cell,"), ("r.parquet", b"PAR1"), ("r.nc", b"\x89HDF")]
+)
 def test_export_writes_and_replaces_only_what_it_wrote(there, call, refused, name, begins):
     shown = call("campaign", "export", "campaign.ledger", name)
     whole = (there / name).read_bytes()

@@ -857,6 +857,8 @@ def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
     found = studied(tmp_path, NO_SCAN, received_with(name))
     heading = "Noise of the communication receiver"
     assert (heading in links_page(found)) is bool(found.receiver_noise)
+    own = [line for name, line in budget_views.lines(found) if name == "Communication receiver"]
+    assert own == list(found.receiver_noise)
     assert heading not in links_page(plain)
 
 

@@ -53,6 +53,25 @@ def test_a_session_opens_the_file_that_it_is_given(file):
     assert Session(file.parent).draft.values[APERTURE].typed == "5 cm"
 
 
+def test_a_page_is_headed_by_its_title(monkeypatch):
+    built = []
+
+    class Framed:
+        def __init__(self, *given):
+            built.append(given)
+
+        def __enter__(self):
+            built.append("within")
+
+        def __exit__(self, *error):
+            built.append("left")
+
+    monkeypatch.setattr("microrad.studio.pages.layout.frame", Framed)
+    page = SimpleNamespace(TITLE="Runs", PATH="/runs", page=built.append)
+    server._framed("session", page, (("Runs", "/runs"),))()
+    assert built == [("session", "Runs", (("Runs", "/runs"),)), "within", "session", "left"]
+
+
 @pytest.mark.promise("studio-7")
 def test_an_empty_folder_gets_the_shipped_mission_unsaved(tmp_path):
     session = Session(tmp_path)
