@@ -724,6 +724,16 @@ def test_a_recording_of_as_many_samples_as_are_read_is_opened(tmp_path):
         process.opened(tmp_path / "a.npy", {"limits": {"samples": 299}})
 
 
+def test_a_thinned_recording_tells_all_of_its_samples(tmp_path):
+    """What is drawn of it has fewer: as many points of each column as are asked for."""
+    time = np.arange(3000) / 1e3
+    np.save(tmp_path / "a.npy", np.stack([5.0 * np.sin(7.0 * time), np.sin(7.0 * time - 0.1)], axis=1))
+    chosen = {"inputs": [0], "outputs": [1], "rate_hz": 1e3, "accept": []}
+    found = process.view(tmp_path / "a.npy", {"columns": chosen, "limits": {"samples": 3000, "points": 100}})
+    assert (found["samples"], found["rate_hz"]) == (3000, 1e3)
+    assert 10 < len(found["rows"]) == len(found["drive"][0]) == len(found["output"][0]) < 1000
+
+
 @linux
 def test_a_zip_bomb_within_the_samples_ends_at_the_memory(tmp_path):
     path = bomb(tmp_path / "bomb.npz", npy_header(20_000_000), 160)
