@@ -49,12 +49,6 @@ def rows(heading):
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in table.splitlines()[2:]]
 
 
-@pytest.fixture
-def session(tmp_path):
-    (tmp_path / "leo-geo.toml").write_bytes(SHIPPED.read_bytes())
-    return Session(tmp_path)
-
-
 @pytest.mark.promise("studio-8")
 def test_the_files_of_the_table_are_those_that_the_studio_keeps(session):
     session.set("terminals.leo_aperture", "6 cm")

@@ -37,13 +37,6 @@ TEXT = SHIPPED.read_text("utf-8")
 
 
 @pytest.fixture
-def session(tmp_path):
-    """The paper's mission, saved."""
-    (tmp_path / "leo-geo.toml").write_text(TEXT, "utf-8")
-    return Session(tmp_path)
-
-
-@pytest.fixture
 def opened(session):
     """Opens tabs on the mission page, at the table of the terminals."""
     clients = []

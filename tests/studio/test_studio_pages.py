@@ -17,7 +17,6 @@ from microrad.studio.jobs.queue import JobError
 from microrad.studio.recordings.reading import ChannelInfo, Listing
 from microrad.studio.recordings.reading import View as Read
 from microrad.studio.recordings.uploads import UploadLimits
-from microrad.studio.session import Session
 from microrad.studio.views import day as day_view
 from microrad.studio.views import link as link_view
 from microrad.studio.views import mirror_form
@@ -55,13 +54,6 @@ from studio_pages import here, texts
 
 LEO = "terminals.leo_aperture"
 TEXT = SHIPPED.read_text("utf-8")
-
-
-@pytest.fixture
-def session(tmp_path):
-    """The paper's mission, saved."""
-    (tmp_path / "leo-geo.toml").write_text(TEXT, "utf-8")
-    return Session(tmp_path)
 
 
 @pytest.fixture

@@ -27,12 +27,6 @@ from shipped import DEFAULT, SHIPPED, links_alone
 
 
 @pytest.fixture
-def session(tmp_path):
-    (tmp_path / "leo-geo.toml").write_bytes(SHIPPED.read_bytes())
-    return Session(tmp_path)
-
-
-@pytest.fixture
 def draft(session):
     return session.draft
 
