@@ -869,10 +869,18 @@ def test_placards_stand_among_the_warnings_of_a_study(monkeypatch):
 @pytest.mark.promise("verification-10")
 def test_draws_are_of_all_inputs_at_once_and_in_pairs_on_both_sides(monkeypatch):
     drawn = []
-    monkeypatch.setattr(sweeps, "_held", lambda checks, factors: drawn.append(factors) or True)
+    asked = set()
+
+    def held(checks, factors):
+        asked.add(tuple(each.name for each in checks))
+        drawn.append(factors)
+        return True
+
+    monkeypatch.setattr(sweeps, "_held", held)
     factors = {"communication.distance": (0.5, 2.0), "terminals.leo_aperture": (0.1, 10.0)}
     sweeps.swept([sweeps.Sweep("The links", ("budgets",), factors, 10)])
     assert len(drawn) == 10
+    assert asked == {("budgets",)}, "no more than the checks of its part"
     for one, other in zip(drawn[::2], drawn[1::2], strict=True):
         for key in factors:
             assert one[key] != 1.0 and one[key] * other[key] == pytest.approx(1.0), key

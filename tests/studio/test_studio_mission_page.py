@@ -72,6 +72,14 @@ def test_a_folder_without_a_mission_has_none_to_open(session, told):
     ]
 
 
+def test_the_command_that_is_copied_is_of_the_mission_that_is_open_then(session, opened, monkeypatch):
+    copied = []
+    monkeypatch.setattr(layout, "copy_buttons", copied.append)
+    opened()
+    session.save("other.toml")
+    assert copied[0]().arguments == ("budget", "other.toml")
+
+
 def test_a_mission_with_every_table_gets_no_other_one(session, told, monkeypatch):
     mission._add_table(session, told.append)
     monkeypatch.setattr(mission, "offered", lambda draft: [])

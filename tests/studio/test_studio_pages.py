@@ -1,6 +1,7 @@
 """The pages beside that of the mission as the server builds them, without a browser."""
 
 import asyncio
+import io
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,6 +34,7 @@ pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 from nicegui import ui
 from nicegui.client import Client
 from nicegui.page import page as at
+from starlette.datastructures import FormData, UploadFile
 
 from microrad.studio.pages import (
     compare,
@@ -1181,6 +1183,20 @@ def test_a_file_that_the_page_has_stopped_says_why(tmp_path, name, words, said):
     field._unsent(SimpleNamespace(args=[name, words]))
     assert found[0].startswith(said)
     assert len(found[0]) == len(said) or not words
+
+
+def test_a_file_is_stored_under_the_whole_name_that_it_was_sent_by(tmp_path):
+    """A name with folders in it has to be refused where names are, so nobody may cut it before."""
+
+    async def form(**_):
+        return FormData([("file", UploadFile(io.BytesIO(b"1,2\n"), filename="../../x.csv"))])
+
+    field = drop.Drop.__new__(drop.Drop)
+    words = []
+    field._refused, field._uploads = words.append, mirror.Uploads(tmp_path / "uploads", UploadLimits())
+    assert asyncio.run(field._stored(SimpleNamespace(form=form))) == []
+    assert "../../x.csv" in words[0]
+    assert not list(tmp_path.rglob("x.csv"))
 
 
 def test_blocks_of_the_same_form_change_in_place_and_others_are_built_anew(tab):
