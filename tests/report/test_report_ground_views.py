@@ -107,7 +107,9 @@ def test_the_page_has_the_figure_and_its_columns_are_the_margins(study):
     assert figure.columns["margin (dB)"] == pytest.approx(wanted, abs=0.0)
     assert figure.columns["elevation (deg)"] == pytest.approx([20.0, 30.0, 45.0, 60.0, 90.0])
     assert figure.columns["lost to fades (dB)"] == pytest.approx([each.fade_db for each in study.ground.elevations])
-    margin, without = figure.sheet.panels[0].marks[:2]
+    (panel,) = figure.sheet.panels
+    assert panel.y.title == "margin (dB)", "a longer one is wrapped, and covers the ticks"
+    margin, without = panel.marks[:2]
     assert np.asarray(without.y) - np.asarray(margin.y) == pytest.approx(figure.columns["lost to fades (dB)"])
     page = links_page(study)
     assert "Down to the station" in page and "Margin over elevation" in page

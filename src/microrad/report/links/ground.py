@@ -142,7 +142,7 @@ def over_elevation(study: LinkStudy, g: GroundLink) -> Figure:
     if np.any(fade > 0.0):
         panel.add(Line(elevation, margin + fade, ORANGE, "--", label="without fades of the air"))
     panel.add(Rule(required, False, VERMILION, ":", label="required"))
-    panel.x, panel.y = Axis("elevation (deg)"), Axis("margin of the communication link (dB)")
+    panel.x, panel.y = Axis("elevation (deg)"), Axis("margin (dB)")
     sheet.legend = Legend("above", 3)
     caption = (
         "Margin of the communication link where the satellite stands higher or lower above the station: range, air and "
