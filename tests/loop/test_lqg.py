@@ -264,6 +264,8 @@ def test_a_plant_without_optical_sensor_is_refused():
 
 @pytest.mark.parametrize("change", [{"command": 0.0}, {"sensor_noise": -1.0}, {"command": math.nan}])
 def test_weights_without_an_optimum_are_refused(change):
+    """Also behind a design of the same plant, of which gains are known by then."""
+    lqg.lqg_controller(FULL, PLAIN)
     with pytest.raises(ValueError, match=r"LQG: a command weight of .* have no optimum: both have to be above 0"):
         lqg.lqg_controller(FULL, replace(PLAIN, **change))
 

@@ -201,7 +201,8 @@ def one_line(text):
 # ------------------------------------------------------------------------------------------------------ what they show
 @pytest.fixture
 def sheets(monkeypatch):
-    """The sheets that are drawn."""
+    """The sheets that are drawn, and no figure before them."""
+    pyplot.close("all")
     seen = []
     monkeypatch.setattr(plots, "axes_of", lambda sheet, axes: seen.append(sheet) or axes_of(sheet, axes))
     return seen

@@ -72,6 +72,7 @@ def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False
         ValueError: For a plant without optical sensor, weights that are not above 0, and where a Riccati equation has
             no solution.
     """
+    _refuse(plant, weights)
     known, seen_by = _solved(plant), (weights.sensor_noise, weights.command_noise_v, weights.walk)
     if seen_by not in known:
         model = observed(in_own_units(plant), weights)
@@ -198,11 +199,7 @@ def observed(plant: DesignPlant, weights: Weights) -> Model:
     Args:
         plant: The plant of one axis.
         weights: Give the size of the walk, of the command's noise and of the sensors' noise.
-
-    Raises:
-        ValueError: For a plant without optical sensor, and for weights that are not above 0.
     """
-    _refuse(plant, weights)
     s, n = plant.system, plant.system.order
     sensors = [OPTICAL, GAUGE] if plant.has_gauge else [OPTICAL]
     walk, floor = _walk(plant)
