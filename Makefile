@@ -44,8 +44,9 @@ $(VENV)/.compiled: $(VENV)/.test scripts/compile_kernels.py $(wildcard src/micro
 numbers: $(VENV)/.test
 	$(BIN)/python scripts/numbers check
 
+# What functions return inside of the tests is held as well, against reference/tests.
 unit: $(VENV)/.test
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10
+	MICRORAD_WITHIN=hold $(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10
 
 # All tests, and what `make test` does once, many times: kills, browser pages at all widths, every key of the mission.
 # For a release.

@@ -4,6 +4,7 @@ import contextlib
 import gc
 import importlib
 import os
+import random
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 os.environ.pop("MAKEFLAGS", None)  # a make that tests call is not part of the one that calls them
@@ -11,6 +12,7 @@ os.environ.pop("MAKEFLAGS", None)  # a make that tests call is not part of the o
 import pytest
 from hypothesis import settings
 
+import reference.within  # before the package, which it loads its own way
 import shared
 import waiting
 from command_line import Result, listing
@@ -84,12 +86,18 @@ def pytest_collection_modifyitems(config, items):
         repeated = [item for item in items if item.get_closest_marker("endurance")]
         items[:] = [item for item in items if not item.get_closest_marker("endurance")]
         config.hook.pytest_deselected(items=repeated)
-    if hasattr(config, "workerinput"):
+    if order := os.environ.get("MICRORAD_ORDER"):  # of scripts/within: what hangs on the order of tests is not held
+        random.Random(order).shuffle(items)
+        files = list(dict.fromkeys(item.path for item in items))
+        items.sort(key=lambda item: files.index(item.path))
+    elif hasattr(config, "workerinput"):
         items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
 
 
 def pytest_configure(config):
     shared.begin(config)
+    if reference.within.MODE:
+        config.pluginmanager.register(reference.within.Within())
     waiting.told = os.dup(2)  # before what tests write is taken in
     if not hasattr(config, "workerinput") and config.getoption("numprocesses", None):
         waiting.end_all_later()  # this process has no tests of its own

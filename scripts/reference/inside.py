@@ -16,11 +16,12 @@ import sys
 import zlib
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from datetime import date, timedelta
 from functools import partial
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from itertools import islice
-from pathlib import Path
-from types import CodeType, MappingProxyType
+from pathlib import Path, PurePath
+from types import CodeType, FunctionType, MappingProxyType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -30,20 +31,26 @@ COMPILED = "microrad.core.kernels"
 SENDER = "__microrad_returning__"
 """Name under which a module that is loaded by ``Telling`` finds what it tells."""
 
+RAISES = "!"
+"""Behind the name of a function, for what it raises."""
+
 CALLS = (1, 2, 3, 5, 10)
 """Those of a function in a process whose values are taken."""
 
 FIRST_CALLS = 3
 """Those alone in a campaign."""
 
-PARTS = 300
+PARTS = 1500
 """Of a value, at most."""
 
-DEEPEST = 5
+DEEPEST = 8
 """Records within records that are looked into."""
 
 SPREAD = 64
 """Elements of an array that are taken, evenly."""
+
+LONGEST = 65536
+"""Bytes of a file that are taken."""
 
 SMALLEST = 1e-12
 """A number below it counts as a rounding of 0."""
@@ -67,8 +74,9 @@ LEFT_OUT = (
 """What they return hangs on the time, the compiler, threads, on which of two processes is first, on how the code is
 written, is the number of an open file, or a whole page."""
 
-_CHANGING = re.compile(r"[0-9a-f]{12,64}|\b\d+\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?")
-"""Hashes and versions in words: they change with each edit of the code, and with each release."""
+_FOLDERS = rf"{re.escape(str(Path(__file__).parents[2]))}|/\S*?/pytest-\d+/(?:popen-gw\d+/)?[^/\s]*?\d+\b"
+_CHANGING = re.compile(rf"{_FOLDERS}|[0-9a-f]{{12,64}}|\b\d+\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?")
+"""Where the project is, hashes, versions and folders of tests: words that change with an edit, a release or a run."""
 
 Values = dict[str, dict[str, float]]
 """By function, and by process and call of a case: `2.30` is the thirtieth call in its second command."""
@@ -90,8 +98,14 @@ def _parts(of: Any, depth: int) -> Iterator[float]:
         yield from _array(np.atleast_1d(of)) if isinstance(of, complex) else (_magnitude(float(of)),)
     elif isinstance(of, str):
         yield zlib.crc32(_CHANGING.sub("", of).encode()) % 9973 / 997.3
+    elif isinstance(of, np.ndarray) and of.dtype.kind in "OUS":
+        yield from _parts([*of.shape, *of.ravel()[:SPREAD].tolist()], depth + 1)
     elif isinstance(of, np.ndarray):
         yield from _array(of)
+    elif isinstance(of, set | frozenset):
+        yield 0.1 * len(of) + sum(value(each) for each in of)
+    elif (words := _worded(of)) is not None:
+        yield from _parts(words, depth)
     else:
         inner = _inner(of)
         yield 0.1 * len(inner)
@@ -99,16 +113,35 @@ def _parts(of: Any, depth: int) -> Iterator[float]:
             yield from _parts(each, depth + 1)
 
 
+def _worded(of: Any) -> str | None:
+    """A value that can be taken for words; nothing where it cannot."""
+    if isinstance(of, bytes | bytearray):
+        return f"{len(of)} {bytes(of[:LONGEST]).decode('latin-1')}"
+    if isinstance(of, date | timedelta):
+        return str(of)
+    if isinstance(of, PurePath):
+        return of.name
+    return of.__qualname__ if isinstance(of, type | FunctionType | MethodType) else None
+
+
 def _inner(of: Any) -> list[object]:
     """What a value holds; nothing where it is of a library."""
     own = partial(object.__getattribute__, of)  # a campaign notes what is read the usual way
-    if type(of) in (dict, MappingProxyType):
+    if isinstance(of, dict | MappingProxyType):
         return [part for item in of.items() for part in item]
+    if isinstance(of, partial):
+        return [of.func, of.args, of.keywords]
+    if type(of).__module__.startswith("xarray.core.data"):  # a Dataset or a DataArray
+        return [of.attrs, *(part for name, each in of.coords.items() for part in (name, each.values)), *_variables(of)]
     if isinstance(of, list | tuple):
         return list(of)
     if dataclasses.is_dataclass(of) and not isinstance(of, type):
         return [own(field.name) for field in dataclasses.fields(of)]
     return list(own("__dict__").values()) if type(of).__module__.startswith("microrad") else []
+
+
+def _variables(of: Any) -> list[object]:
+    return [of.values] if hasattr(of, "values") and not callable(of.values) else [*of.data_vars, *of.data_vars.values()]
 
 
 def _array(of: np.ndarray[Any, Any]) -> Iterator[float]:
@@ -152,17 +185,21 @@ class Watch:
         Watch.current = None
         file.write_text(json.dumps(self.values), encoding="utf-8")
 
+    def takes(self, name: str) -> int:
+        """Which call of a function this is, and 0 where its value is not taken."""
+        call = self._calls[name] = self._calls[name] + 1
+        return call if call in CALLS else 0
+
     def saw(self, name: str, returned: object) -> None:
         """A function returns something: its module and name, and what it is."""
-        if self._is_busy:
-            return
-        call = self._calls[name] = self._calls[name] + 1
-        if call not in CALLS:
+        if self._is_busy or not (call := self.takes(name)):
             return
         self._is_busy = True
         try:
             found = returned
-            if found is None:  # what it has changed
+            if isinstance(found, BaseException):
+                found = [type(found).__name__, str(found)]
+            elif found is None:  # what it has changed
                 frame = sys._getframe(2)
                 code = frame.f_code
                 found = [frame.f_locals.get(each) for each in code.co_varnames[: code.co_argcount]]
@@ -188,6 +225,14 @@ class Telling(SourceFileLoader):
     A profiler would be told of each call of the libraries as well: that takes as long as the cases themselves.
     """
 
+    def exec_module(self, module: ModuleType) -> None:
+        """Load the module; what it calls meanwhile hangs on who is the first to load it, and is not told."""
+        watch, Watch.current = Watch.current, None
+        try:
+            super().exec_module(module)
+        finally:
+            Watch.current = watch
+
     def get_code(self, fullname: str) -> CodeType:
         """The module's code, never that of its bytecode file."""
         path = self.get_filename(fullname)
@@ -208,13 +253,20 @@ class _Finder:
         return spec
 
 
-def tell() -> None:
-    """From now on modules of the package are loaded so that their functions tell what they return."""
+def tell(left_out: tuple[str, ...] = LEFT_OUT) -> None:
+    """From now on modules of the package are loaded so that their functions tell what they return.
+
+    Args:
+        left_out: Begins of the names of functions that do not.
+    """
+    _Returns.left_out = left_out
     sys.meta_path.insert(0, _Finder)
 
 
 class _Returns(ast.NodeTransformer):
-    """Sends what functions return and yield through ``_returning``; a lambda has no name."""
+    """Sends what functions return, yield and raise through ``_returning``; a lambda has no name."""
+
+    left_out: tuple[str, ...] = LEFT_OUT
 
     def __init__(self, file: str) -> None:
         self.module = file.removesuffix(".py").replace(os.sep, ".")
@@ -233,7 +285,7 @@ class _Returns(ast.NodeTransformer):
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         outer = self.name
         own = f"{self.module}:{'.'.join([*self.inside, node.name])}"
-        self.name = "" if own.startswith(LEFT_OUT) else own
+        self.name = "" if own.startswith(self.left_out) else own
         self.inside += [node.name, "<locals>"]
         node.body = [self.visit(each) for each in node.body]
         del self.inside[-2:]
@@ -245,6 +297,13 @@ class _Returns(ast.NodeTransformer):
     def visit_Return(self, node: ast.Return) -> ast.AST:
         self.generic_visit(node)
         return self._told(node.value or ast.Constant(None), node) if self.name else node
+
+    def visit_Raise(self, node: ast.Raise) -> ast.AST:
+        self.generic_visit(node)
+        if self.name and isinstance(node.exc, ast.Call):
+            told: list[ast.expr] = [ast.Constant(f"{self.name}{RAISES}"), node.exc]
+            node.exc = ast.Call(ast.Name(SENDER, ast.Load()), told, [])
+        return node
 
     def visit_Yield(self, node: ast.Yield) -> ast.AST:
         self.generic_visit(node)

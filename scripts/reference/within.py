@@ -1,0 +1,182 @@
+"""What functions return, yield and raise while a test runs, held against reference/tests.
+
+A test asserts what it is about, and passes through much more. With MICRORAD_WITHIN=hold, as `make unit` sets it, a test
+that has passed fails where a function inside of it returns something else than it did. scripts/within writes that.
+"""
+
+import json
+import os
+import sys
+import time
+import zlib
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from reference import inside
+
+MODE = os.environ.get("MICRORAD_WITHIN", "")
+"""`hold`; or a folder to write values into: those that `held` in it names, or all; or nothing."""
+
+HOLDS = MODE == "hold"
+REFERENCE = Path(__file__).resolve().parents[2] / "reference" / "tests" if HOLDS else Path(MODE, "held")
+BY_CHANCE = ("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes")
+"""Functions whose values hang on the time, or are numbers of open files."""
+
+OF_FILE = 32
+"""Values of a function that are written of a file of tests, each unlike the others."""
+
+LOOKED = 4 * OF_FILE
+"""Values of a function that are looked at for them."""
+
+
+class Holding(inside.Watch):
+    """Takes from a test what was held of it."""
+
+    def __init__(self, held):
+        """Its values, by function and call."""
+        super().__init__()
+        self._held = {name: {int(call) for call in calls} for name, calls in held.items()}
+
+    def takes(self, name):
+        """Which call of a function this is, and 0 where its value is not taken."""
+        if (held := self._held.get(name)) is None:
+            return 0
+        call = self._calls[name] = self._calls[name] + 1
+        return call if call in held else 0
+
+
+class OfFile:
+    """Values of the functions in a file of tests."""
+
+    def __init__(self):
+        """Nothing yet."""
+        self.looked = defaultdict(int)
+        self.distinct = defaultdict(set)
+
+    def new(self, values):
+        """Those that no test of the file had before."""
+        found = defaultdict(dict)
+        for name, calls in values.items():
+            for call, x in calls.items():
+                if round(x, 2) not in self.distinct[name]:
+                    self.distinct[name].add(round(x, 2))
+                    found[name][call] = x
+        return found
+
+
+class Taking(inside.Watch):
+    """Takes values of each function until its file of tests has enough."""
+
+    def __init__(self, of_file):
+        """What its file has so far."""
+        super().__init__()
+        self._of_file = of_file
+
+    def takes(self, name):
+        """Which call of a function this is, and 0 where its value is not taken."""
+        call, of_file = super().takes(name), self._of_file
+        if not call or of_file.looked[name] >= LOOKED or len(of_file.distinct[name]) >= OF_FILE:
+            return 0
+        of_file.looked[name] += 1
+        return call
+
+
+class Within:
+    """Watches each test that runs."""
+
+    def __init__(self):
+        """No test yet."""
+        self._file = ""
+        self._held = Held()
+        self._of_file = OfFile()
+        self._caches = Caches()
+
+    def pytest_collection_modifyitems(self, items):
+        """Of those that are held alone, where it is asked whether others agree."""
+        if not HOLDS and REFERENCE.exists():
+            items[:] = [item for item in items if self._held[place(item)[0]].keys() & set(places(item))]
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item):
+        """Fail a test inside of which something is another one; or write what there is."""
+        return (yield from self._watched(*place(item), item.name))
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self, fixturedef, request):
+        """The same for what a test, or all tests of a file, get."""
+        if fixturedef.scope not in ("function", "module"):  # whoever is the first sets up the others
+            return (yield)
+        name = f"@{fixturedef.argname}{getattr(request, 'param_index', 0)}"
+        return (yield from self._watched(*place(request.node, name), name))
+
+    def _watched(self, file, test, name):
+        if file != self._file:
+            self._file, self._of_file = file, OfFile()
+        held = self._held[file].get(test, {})
+        if not held and (HOLDS or REFERENCE.exists()):
+            return (yield)
+        watch, outer = Holding(held) if held else Taking(self._of_file), inside.Watch.current
+        self._caches.clear()
+        inside.Watch.current = watch
+        began = time.perf_counter()
+        try:
+            result = yield
+        finally:
+            inside.Watch.current = outer
+        if not HOLDS:
+            if found := watch.values if held else self._of_file.new(watch.values):
+                with Path(MODE, f"{os.getpid()}.jsonl").open("a", encoding="utf-8") as out:
+                    out.write(json.dumps([file, test, time.perf_counter() - began, found]) + "\n")
+        elif moved := inside.moved(name, held, watch.values):
+            pytest.fail("\n".join([*moved, f"Where that is meant: scripts/within tests/{file}"]), pytrace=False)
+        return result
+
+
+class Caches:
+    """Those of the package's functions: what one test leaves in them the next one would not ask for again."""
+
+    def __init__(self):
+        """None yet."""
+        self._modules = set()
+        self._known = []
+
+    def clear(self):
+        """Empty all of the modules that are loaded by now."""
+        for name in [each for each in sys.modules if each.startswith("microrad.") and each not in self._modules]:
+            self._modules.add(name)
+            of = [sys.modules[name], *(each for each in vars(sys.modules[name]).values() if isinstance(each, type))]
+            cached = [getattr(each, "__func__", each) for part in of for each in vars(part).values()]
+            self._known += [each for each in cached if callable(getattr(each, "cache_clear", None))]
+        for each in self._known:
+            each.cache_clear()
+
+
+class Held(dict):
+    """What is held of a file of tests: values by test, function and call."""
+
+    def __missing__(self, file):
+        """Read it."""
+        found = self[file] = defaultdict(lambda: defaultdict(dict))
+        for name, values in inside.load(REFERENCE / Path(file).with_suffix(".txt")).items():
+            for key, x in values.items():
+                test, call = key.split(".")
+                found[test][name][call] = x
+        return found
+
+
+def place(node, more=""):
+    """File of a test, and eight letters for its name; or of a fixture, by what it is of."""
+    file, _, name = node.nodeid.removeprefix("tests/").partition("::")
+    return file, f"{zlib.crc32((name + more).encode()):08x}"
+
+
+def places(item):
+    """Those eight letters of a test, and of all its fixtures without parameters or with the first one."""
+    names = [f"@{name}0" for name in item.fixturenames]
+    return [place(each, name)[1] for each in (item, item.getparent(pytest.Module)) for name in ("", *names)]
+
+
+if MODE:
+    inside.tell(BY_CHANCE)
