@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
+from nicegui import Client, ui
+from nicegui.page import page
 
 from microrad.link import gains
 from places import ROOT
@@ -76,6 +79,31 @@ def test_each_part_of_a_value_moves_it_by_more_than_a_rounding(other):
 def test_what_libraries_return_is_a_value_as_well(one, other):
     assert abs(inside.value(one) - inside.value(other)) > inside.NEAR
     assert inside.value(one) == inside.value(copy.deepcopy(one))
+
+
+def test_an_element_of_a_page_is_what_it_shows_and_holds():
+    def shown(words="5 W", classes="mission-field", props="title=Power", style="width: 1em"):
+        with Client(page("")) as client, client.content:
+            column = ui.column()
+            with column:
+                ui.label(words).classes(classes).props(props).style(style)
+        return inside.value([column])
+
+    assert shown() == shown()
+    values = {shown(), shown("6 W"), shown(classes=""), shown(props="title=Loss"), shown(style="width: 2em")}
+    assert len(values) == 5
+
+
+def test_axes_are_what_is_drawn_and_written_in_them():
+    def drawn(title="Margin", y=(1.0, 2.0), scale="linear", unit="dB"):
+        axes = Figure().subplots()
+        axes.plot([0.0, 1.0], y)
+        axes.set(title=title, yscale=scale, ylabel=unit)
+        return inside.value(axes)
+
+    values = {drawn(), drawn("Loss"), drawn(y=(1.0, 3.0)), drawn(scale="log"), drawn(unit="dBm")}
+    assert len(values) == 5
+    assert drawn() == drawn()
 
 
 def test_a_residue_of_rounding_counts_as_nothing_and_what_is_not_finite_is_told_apart():

@@ -15,7 +15,7 @@ import re
 import sys
 import zlib
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import date, timedelta
 from functools import partial
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
@@ -125,23 +125,47 @@ def _worded(of: Any) -> str | None:
 
 
 def _inner(of: Any) -> list[object]:
-    """What a value holds; nothing where it is of a library."""
+    """What a value holds."""
     own = partial(object.__getattribute__, of)  # a campaign notes what is read the usual way
     if isinstance(of, dict | MappingProxyType):
         return [part for item in of.items() for part in item]
-    if isinstance(of, partial):
-        return [of.func, of.args, of.keywords]
-    if type(of).__module__.startswith("xarray.core.data"):  # a Dataset or a DataArray
-        return [of.attrs, *(part for name, each in of.coords.items() for part in (name, each.values)), *_variables(of)]
     if isinstance(of, list | tuple):
         return list(of)
     if dataclasses.is_dataclass(of) and not isinstance(of, type):
         return [own(field.name) for field in dataclasses.fields(of)]
-    return list(own("__dict__").values()) if type(of).__module__.startswith("microrad") else []
+    if type(of).__module__.startswith("microrad"):
+        return list(own("__dict__").values())
+    return next((inner for has, inner in _FOREIGN if has(of)), _nothing)(of)
 
 
-def _variables(of: Any) -> list[object]:
-    return [of.values] if hasattr(of, "values") and not callable(of.values) else [*of.data_vars, *of.data_vars.values()]
+def _dataset(of: Any) -> list[object]:
+    places = [part for name, each in of.coords.items() for part in (name, each.values)]
+    of_array = hasattr(of, "values") and not callable(of.values)
+    return [of.attrs, *places, *([of.values] if of_array else [*of.data_vars, *of.data_vars.values()])]
+
+
+def _element(of: Any) -> list[object]:
+    shown = [each for each in of._props.items() if isinstance(each[1], str | bool | int | float)]
+    children = [child for slot in of.slots.values() for child in slot.children]
+    return [of.tag, list(of._classes), dict(of._style), shown, getattr(of, "text", None), *children]
+
+
+def _axes(of: Any) -> list[object]:
+    said = [of.get_title(), of.get_xlabel(), of.get_ylabel(), *(each.get_text() for each in of.texts)]
+    return [said, of.get_xscale(), of.get_yscale(), *(each.get_xydata() for each in of.get_lines())]
+
+
+def _nothing(_: object) -> list[object]:
+    return []
+
+
+_FOREIGN: tuple[tuple[Callable[[Any], bool], Callable[[Any], list[object]]], ...] = (
+    (lambda of: isinstance(of, partial), lambda of: [of.func, of.args, of.keywords]),
+    (lambda of: type(of).__module__.startswith("xarray.core.data"), _dataset),
+    (lambda of: hasattr(of, "_props") and hasattr(of, "_classes"), _element),
+    (lambda of: hasattr(of, "get_xlim") and hasattr(of, "get_lines"), _axes),
+)
+"""What there is in values of libraries: calls that wait, data sets, elements of a page, axes of a figure."""
 
 
 def _array(of: np.ndarray[Any, Any]) -> Iterator[float]:

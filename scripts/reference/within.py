@@ -21,8 +21,13 @@ MODE = os.environ.get("MICRORAD_WITHIN", "")
 
 HOLDS = MODE == "hold"
 REFERENCE = Path(__file__).resolve().parents[2] / "reference" / "tests" if HOLDS else Path(MODE, "held")
-BY_CHANCE = ("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes")
-"""Functions whose values hang on the time, or are numbers of open files."""
+BY_CHANCE = (
+    *("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes"),
+    *("core.integrity:", "core.threads:"),
+)
+"""Functions whose values hang on the time, are numbers of open files, or change with each edit of the package."""
+
+CORES = os.cpu_count
 
 OF_FILE = 32
 """Values of a function that are written of a file of tests, each unlike the others."""
@@ -111,6 +116,14 @@ class Within:
         name = f"@{fixturedef.argname}{getattr(request, 'param_index', 0)}"
         return (yield from self._watched(*place(request.node, name), name))
 
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_teardown(self, item):
+        """A test that has changed the number of cores puts back what it found."""
+        try:
+            return (yield)
+        finally:
+            os.cpu_count = CORES
+
     def _watched(self, file, test, name):
         if file != self._file:
             self._file, self._of_file = file, OfFile()
@@ -119,12 +132,14 @@ class Within:
             return (yield)
         watch, outer = Holding(held) if held else Taking(self._of_file), inside.Watch.current
         self._caches.clear()
+        os.cpu_count = lambda: 1  # work is cut into parts by their number, and threads take turns
         inside.Watch.current = watch
         began = time.perf_counter()
         try:
             result = yield
         finally:
             inside.Watch.current = outer
+            os.cpu_count = CORES
         if not HOLDS:
             if found := watch.values if held else self._of_file.new(watch.values):
                 with Path(MODE, f"{os.getpid()}.jsonl").open("a", encoding="utf-8") as out:

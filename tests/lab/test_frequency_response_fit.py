@@ -406,6 +406,12 @@ def spoilt(values, at, value):
         (FREQ_HZ, 1e-31 * FLAT, {}, r"a magnitude below 1e-30 or above 1e\+30, and none has that in SI units"),
         (FREQ_HZ, FLAT, {"hold": "zero-order"}, "a zero-order hold needs the sample rate; give rate_hz"),
         (FREQ_HZ, FLAT, {"hold": "second-order"}, "hold 'second-order' is not known; use zero-order, first-order or"),
+        (
+            FREQ_HZ,
+            FLAT,
+            {"standard_error": spoilt(spoilt(np.ones(60), 3, 0.0), 9, -1.0)},
+            f"the standard error at {FREQ_HZ[3]:g} Hz is 0; each must be above 0",
+        ),
     ],
 )
 def test_refusals(freq, response, words, message):

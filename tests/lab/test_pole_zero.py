@@ -373,3 +373,11 @@ def test_poles_go_as_long_as_the_held_out_recordings_do_not_need_them():
     assert asked == [(11.0, 400.0), (400.0,)]
     needed = fitted_to(linear, (0.1, 399.0, 9e3))
     assert _without_spare_poles(candidates, needed, None) is needed
+
+
+def test_with_a_pole_goes_the_zero_that_is_nearest_to_it():
+    poles, far = (Root(100.0, None), Root(3000.0, 0.1), Root(5000.0, 0.1)), (Root(900.0, None), Root(400.0, 0.1))
+    at = PoleZero(poles, (far[0], Root(105.0, None), far[1]), 0.0)
+    found = pole_zero._others(SimpleNamespace(at=at, problem=SimpleNamespace(highest_hz=1e4)))
+    without = [one.zeros for one in found if one.poles == poles[1:]]
+    assert without == [far, (far[0], Root(105.0, None))]

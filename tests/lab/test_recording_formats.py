@@ -428,6 +428,21 @@ def test_lvm_segments(tmp_path):
     np.testing.assert_allclose(read.drive[:, 0], DRIVE[334:667], atol=1e-12)
 
 
+def test_an_lvm_segment_without_rows_ends_at_its_names(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=3)
+    parts = path.read_bytes().split(b"\r\n\r\n")
+    parts[2] = parts[2][: parts[2].index(b"\r\n", parts[2].rfind(b"X_Value"))]
+    path.write_bytes(b"\r\n\r\n".join(parts))
+    assert "'0/drive', '0/output', '1/drive', '1/output', '2/drive'" in refusal(path, "drove", "output")
+    np.testing.assert_allclose(read_recording(path, "2/drive", "2/output").drive[:, 0], DRIVE[667:], atol=1e-12)
+
+
+def test_the_header_of_an_lvm_file_may_have_letters_beyond_ascii(tmp_path):
+    path = lvm(tmp_path / "a.lvm")
+    path.write_bytes(path.read_bytes().replace(b"Writer_Version", b"Operator\tJ\xf6rg, 20 \xb0C\r\nWriter_Version"))
+    check(read_recording(path, "drive", "output"))
+
+
 def test_lvm_segments_of_one_clock_go_on_where_x0_says(tmp_path):
     path, begins = lvm(tmp_path / "a.lvm", segments=3), TIME_S[[0, 334, 667]]
     text = path.read_bytes()

@@ -56,6 +56,14 @@ def fades(folder, deep=0.5):
     (folder / "fades.csv").write_text("time (s),power\n" + rows)
 
 
+def test_of_a_file_with_several_channels_the_one_that_is_named_is_read(tmp_path):
+    fades(tmp_path)
+    head, *rows = (tmp_path / "fades.csv").read_text().splitlines()
+    (tmp_path / "both.csv").write_text("\n".join([f"{head},other", *(f"{row},1" for row in rows)]) + "\n")
+    one, both = (link_file(tmp_path, fading(**more)) for more in ({}, {"series": "both.csv", "channel": "power"}))
+    assert run_link_study(both).fading.penalty_db == run_link_study(one).fading.penalty_db
+
+
 @pytest.mark.promise("readme-7", "link-85", "link-86")
 def test_the_study_has_what_the_series_makes_of_its_static_margin(tmp_path):
     fades(tmp_path)

@@ -6,6 +6,7 @@ import re
 import sys
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -374,6 +375,25 @@ def test_h_infinity_damps_each_mode_that_the_commands_reach():
 
 
 @pytest.mark.promise("pointing-78")
+def test_a_controller_knows_the_design_of_the_simpler_one_that_it_contains(monkeypatch):
+    """A base comes first, whatever the order; one that could not be designed is none."""
+    asked = {}
+
+    def made(scene, family, of, base):
+        asked[family.name] = base and base.name
+        if family.name == "refused":
+            raise ValueError("its margin is out of reach")
+        return designs.CoupledDesign(family.name, {}, None, None, None, None)
+
+    monkeypatch.setattr(designs, "_designed", made)
+    simple, refused = (SimpleNamespace(name=name, base=None) for name in ("simple", "refused"))
+    whole, beyond = (SimpleNamespace(name=f"beyond {each.name}", base=each) for each in (simple, refused))
+    found = designs._designed_in_turn(None, [whole, beyond, refused, simple], [])
+    assert asked == {"refused": None, "simple": None, "beyond simple": "simple", "beyond refused": None}
+    assert found["refused"] == "its margin is out of reach"
+    assert found["beyond simple"].name == "beyond simple"
+
+
 def test_what_hysteresis_breaks_is_tuned_for_a_larger_margin(monkeypatch):
     """As if all left 1.51 times as much but for what is tuned for a margin of 0.7 or above, which leaves 1.49."""
     scene, _ = plate()

@@ -319,6 +319,7 @@ def test_what_the_mirror_file_does_not_hold_is_said(found, page, data):
         "Hysteresis",
         ways,
     ]
+    assert words.not_held(replace(found, candidates=(replace(linear, kind="per axis"),), chosen=linear.name)) == other
 
 
 # --------------------------------------------------------------------------------------------------------- the terminal

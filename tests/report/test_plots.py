@@ -54,6 +54,7 @@ PAGE = (ROOT / "docs" / "plots.md").read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def closed():
+    pyplot.close("all")
     yield
     pyplot.close("all")
 
@@ -201,8 +202,7 @@ def one_line(text):
 # ------------------------------------------------------------------------------------------------------ what they show
 @pytest.fixture
 def sheets(monkeypatch):
-    """The sheets that are drawn, and no figure before them."""
-    pyplot.close("all")
+    """The sheets that are drawn."""
     seen = []
     monkeypatch.setattr(plots, "axes_of", lambda sheet, axes: seen.append(sheet) or axes_of(sheet, axes))
     return seen

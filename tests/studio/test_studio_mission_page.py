@@ -515,6 +515,7 @@ def test_keys_that_a_table_needs_are_offered_as_such(session, opened):
 def test_a_choice_has_its_options_and_a_text_has_a_line(session, tab, key, typed, options):
     draft = session.draft.with_text(TEXT + "[more]\nunknown = 1\n").set(key, typed)
     found = mission_form._field(draft.values[key])
+    assert "mission-field" in found._classes  # as the style sheet knows it
     assert found.value == typed
     assert getattr(found, "options", None) == options
     other = draft.set(key, "zzz").values[key]
@@ -791,3 +792,14 @@ def test_a_refusal_is_shown_and_nothing_done_is_told_from_done(monkeypatch, sess
     monkeypatch.setattr(session, "save", lambda: Path("/nowhere/x").read_text())
     assert not layout.save_draft(session)
     assert len(said) == 2 and "is outside of" in said[0] and "No such file" in said[1]
+
+
+def test_a_report_is_shown_in_a_frame_that_says_what_it_is_of(tab, monkeypatch):
+    monkeypatch.setattr(ui, "run_javascript", lambda script: None)
+    viewer = runs._Viewer()
+    viewer.build()
+    viewer.show("/files/found/report.html", "found")
+    (frame,) = [each for each in viewer.place.descendants() if each.tag == "iframe"]
+    assert (frame.props["src"], frame.props["title"]) == ("/files/found/report.html", "found")
+    viewer.show("/files/later/report.html", "later")
+    assert [each.props["title"] for each in viewer.place.descendants() if each.tag == "iframe"] == ["later"]

@@ -217,6 +217,7 @@ def test_a_study_is_run_into_a_free_folder_once_the_mission_is_saved(session, ta
         assert words in study.fault.text
     assert asked.orders == []
     study.folder.value = "leo-geo-study"
+    assert study._action() is not None and study.fault.text == ""
     (session.folder / "leo-geo-study").mkdir()
     session.set(LEO, "6 cm")
     study._look()
