@@ -23,9 +23,11 @@ HOLDS = MODE == "hold"
 REFERENCE = Path(__file__).resolve().parents[2] / "reference" / "tests" if HOLDS else Path(MODE, "held")
 BY_CHANCE = (
     *("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes"),
-    *("core.integrity:", "core.threads:"),
+    *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
+    *("studio.jobs.", "studio.views.latest:", "studio.guard.names:within", "campaign.engines."),
 )
-"""Functions whose values hang on the time, are numbers of open files, or change with each edit of the package."""
+"""Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the package
+or name the place where Python is."""
 
 CORES = os.cpu_count
 
