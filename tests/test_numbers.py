@@ -255,6 +255,8 @@ def test_each_case_has_its_file_sorted_and_small():
 
 @pytest.mark.promise("releasing-2")
 def test_the_release_is_kept_once_and_the_changelog_says_what_moved_since():
-    (release,) = (path for path in REFERENCE.iterdir() if path.is_dir() and path.name not in ("told", "inside", "tests"))
+    (release,) = (
+        path for path in REFERENCE.iterdir() if path.is_dir() and path.name not in ("told", "inside", "tests")
+    )
     assert len(list(release.glob("*.json"))) > 20
     assert list(comparing.lacking(REFERENCE, (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))) == []

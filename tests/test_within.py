@@ -198,7 +198,7 @@ def test_values_unlike_each_other_are_chosen_from_the_tests_that_are_quickest():
     found |= {("quick.py", "new:f", f"bbbbbbbb.{call}"): float(call) for call in range(5, 20)}
     found |= {("slow.py", "new:g", "aaaaaaaa.1"): 3.0}
     found |= {("slowest.py", "new:f", "dddddddd.1"): 99.0}
-    took_s = {("slowest.py", "dddddddd"): 99.0, ("slow.py", "aaaaaaaa"): 0.1, ("quick.py", "bbbbbbbb"): 0.01}
+    took_s = {("slowest.py", "dddddddd"): 99.0, ("slow.py", "aaaaaaaa"): 0.05, ("quick.py", "bbbbbbbb"): 0.01}
     chosen = of.choose(found, took_s, {("other.py", "new:f", "cccccccc.1"): 5.001}, {"new:f": 3})
     assert chosen == {
         **{("quick.py", "new:f", f"bbbbbbbb.{call}"): float(call) for call in range(6, 14)},

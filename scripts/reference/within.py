@@ -26,8 +26,8 @@ BY_CHANCE = (
     *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
     *("studio.jobs.", "studio.views.latest:", "studio.guard.names:within", "campaign.engines."),
 )
-"""Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the package
-or name the place where Python is."""
+"""Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the
+package, or name the place where Python is."""
 
 CORES = os.cpu_count
 
