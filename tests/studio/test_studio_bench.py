@@ -683,6 +683,28 @@ def test_margins_in_words_against_what_is_asked_for(mission, pi):
     assert control_view.sensitivity_plot(bound)["data"] == control_view.gain_plot(bound)["data"] == []
 
 
+def test_a_controller_has_the_amplifiers_limits_and_the_identified_range(monkeypatch):
+    """Neither is the other: a mirror may have been identified over a part of what its amplifier gives."""
+    tuned = SimpleNamespace(
+        controller=None, margins=SimpleNamespace(bandwidth_hz=100.0), values={}, residual_rms_rad=0.0, bound_by=()
+    )
+    for name, made in (("plants", [None]), ("tune", tuned), ("build", None)):
+        monkeypatch.setattr(controller_study, name, lambda *given, made=made: made)
+    family = SimpleNamespace(name="PI", parameters=lambda plant: [])
+    monkeypatch.setattr(control_model, "families", lambda table: [family])
+    monkeypatch.setattr(control_model, "_responses", lambda *given: (None, None))
+    loop = SimpleNamespace(
+        timing=SimpleNamespace(period_s=1e-4),
+        drive=SimpleNamespace(minimum_v=-6.0, maximum_v=7.0),
+        drive_range_v=(-3.0, 4.0),
+        optical=SimpleNamespace(field_of_view_rad=1e-3),
+    )
+    scene = SimpleNamespace(table=SimpleNamespace(seed=1, modulus_margin=0.5), loop=loop)
+    found = control_model._fine(scene, "PI")
+    assert (found.limits_v, found.identified_v) == ((-6.0, 7.0), (-3.0, 4.0))
+    assert found.rate_hz == pytest.approx(1e4)
+
+
 @pytest.mark.promise("studio-12")
 def test_plots_carry_units_limits_and_both_variants(pi, answers):
     shown = {
