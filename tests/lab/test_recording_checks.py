@@ -14,7 +14,7 @@ from microrad.lab.recording import (
     read_recording,
     recording_from_arrays,
 )
-from microrad.lab.recording.checks import sample_rate
+from microrad.lab.recording.checks import channel, sample_rate
 from microrad.lab.recording.checks.channel import _percent, _trend, clipping, drift, quantum
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.formats.source import StatedRate
@@ -846,3 +846,11 @@ def test_a_channel_of_the_largest_or_smallest_size_is_taken(size):
     assert recording_from_arrays(drive * size, play(multisine()), RATE_HZ).samples == N
     with pytest.raises(RecordingError, match="no converter gives a channel of less than 1e-30 or more than 1e"):
         recording_from_arrays(drive * size * (1.01 if size > 1.0 else 0.99), play(multisine()), RATE_HZ)
+
+
+@pytest.mark.parametrize(("step", "gather"), [(97, True), (2, True), (1, False)])
+def test_samples_pile_up_at_a_limit_one_by_one_and_not_in_one_run(step, gather):
+    values = np.random.default_rng(3).uniform(-1.0, 0.95, 10_000)
+    at = 50 + step * np.arange(100)
+    values[at] = 1.0
+    assert channel._piles_up(values, at, 1.0, 1e-6, 2.0) is gather
