@@ -21,7 +21,7 @@ from functools import partial
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from itertools import islice
 from pathlib import Path, PurePath
-from types import CodeType, FunctionType, MappingProxyType, MethodType, ModuleType
+from types import CodeType, MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ LEFT_OUT = (
     *("report.page.", "report.identification.page:identification_page", "core.folder:write_whole"),
     "core.folder:_left_behind",
     *("export.flight.build:", "export.flight.write:", "loop.pointing_loop.ensemble:_Drawing"),
-    *("campaign.engines.", "mission.explain:_used"),
+    *("campaign.engines.", "mission.explain:_used", "loop.pointing_loop.ensemble:_Advancing"),
 )
 """What they return hangs on the time, the compiler, threads, on which of two processes is first, on how the code is
 written, is the number of an open file, or a whole page."""
@@ -121,7 +121,7 @@ def _worded(of: Any) -> str | None:
         return str(of)
     if isinstance(of, PurePath):
         return of.name
-    return of.__qualname__ if isinstance(of, type | FunctionType | MethodType) else None
+    return of.__qualname__ if isinstance(of, type) else None
 
 
 def _inner(of: Any) -> list[object]:

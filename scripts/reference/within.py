@@ -1,7 +1,7 @@
 """What functions return, yield and raise while a test runs, held against reference/tests.
 
-A test asserts what it is about, and passes through much more. With MICRORAD_WITHIN=hold, as `make unit` sets it, a test
-that has passed fails where a function inside of it returns something else than it did. scripts/within writes that.
+A test asserts what it is about, and passes through much more. With MICRORAD_WITHIN=hold, as `make within` sets it, a
+test that has passed fails where a function inside of it returns something else than it did. scripts/within writes that.
 """
 
 import json
@@ -25,6 +25,7 @@ BY_CHANCE = (
     *("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes"),
     *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
     *("studio.jobs.", "studio.views.latest:", "studio.guard.names:within", "campaign.engines."),
+    "loop.pointing_loop.ensemble:_Advancing",
 )
 """Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the
 package, or name the place where Python is."""
