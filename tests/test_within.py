@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from places import ROOT
-from reference import inside, within
+from reference import inside, neighbours, within
 
 CODE = """
 from functools import cache
@@ -51,6 +51,7 @@ def code(tmp_path, monkeypatch):
     (tmp_path / "microrad").mkdir()
     file = tmp_path / "microrad" / "new.py"
     file.write_text(CODE, encoding="utf-8")
+    monkeypatch.setattr(inside._Returns, "not_entered", ("new:refuse",))
     loader = inside.Telling("microrad.new", str(file))
     module = module_from_spec(spec_from_loader("microrad.new", loader))
     module.FACTOR = 2.0
@@ -84,7 +85,8 @@ def held(code, tmp_path, monkeypatch):
     ((file, test, took_s, found),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
     assert (file, test) == ("link/test_x.py", f"{zlib.crc32(b'test_it[1.5]'):08x}")
     assert took_s >= 0.0
-    assert found.keys() == {"new:once", "new:part", "new:Kept.method", "new:refuse!"}
+    assert found.keys() == {"new:once", "new:part", "new:part~", "new:Kept.method", "new:refuse!"}
+    assert found["new:part~"].keys() == {f"1{number}" for number in neighbours.NUMBERS}
     values = {name: {f"{test}.{call}": x for call, x in calls.items()} for name, calls in found.items()}
     inside.save(tmp_path / "held" / "link" / "test_x.txt", values)
     monkeypatch.setattr(within, "HOLDS", True)
@@ -111,7 +113,7 @@ def test_a_function_that_returns_something_else_fails_the_test_by_name(code, hel
         watched(held, lambda: all_of(code))
     lines = str(failed.value).splitlines()
     assert [line.partition(" returns ")[0] for line in lines[:-1]] == [
-        f"test_it[1.5]: inside of it new:{name}" for name in ("Kept.method", "once", "part")
+        f"test_it[1.5]: inside of it new:{name}" for name in ("Kept.method", "once", "part", "part~")
     ]
     assert lines[-1] == "Where that is meant: scripts/within tests/link/test_x.py"
     assert inside.Watch.current is None

@@ -21,7 +21,7 @@ from functools import partial
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from itertools import islice
 from pathlib import Path, PurePath
-from types import CodeType, MappingProxyType, ModuleType
+from types import CodeType, FrameType, MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,9 @@ PACKAGE = f"{os.sep}microrad{os.sep}"
 COMPILED = "microrad.core.kernels"
 SENDER = "__microrad_returning__"
 """Name under which a module that is loaded by ``Telling`` finds what it tells."""
+
+ENTERED = "__microrad_entered__"
+"""The same for a function that begins."""
 
 RAISES = "!"
 """Behind the name of a function, for what it raises."""
@@ -214,6 +217,9 @@ class Watch:
         call = self._calls[name] = self._calls[name] + 1
         return call if call in CALLS else 0
 
+    def enters(self, name: str, frame: FrameType) -> None:
+        """A function is called: nothing is taken of that here."""
+
     def saw(self, name: str, returned: object) -> None:
         """A function returns something: its module and name, and what it is."""
         if self._is_busy or not (call := self.takes(name)):
@@ -240,7 +246,13 @@ def _returning(name: str, returned: object) -> object:
     return returned
 
 
+def _entering(name: str) -> None:
+    if Watch.current is not None:
+        Watch.current.enters(name, sys._getframe(1))
+
+
 setattr(builtins, SENDER, _returning)
+setattr(builtins, ENTERED, _entering)
 
 
 class Telling(SourceFileLoader):
@@ -277,13 +289,14 @@ class _Finder:
         return spec
 
 
-def tell(left_out: tuple[str, ...] = LEFT_OUT) -> None:
+def tell(left_out: tuple[str, ...] = LEFT_OUT, not_entered: tuple[str, ...] = ("",)) -> None:
     """From now on modules of the package are loaded so that their functions tell what they return.
 
     Args:
         left_out: Begins of the names of functions that do not.
+        not_entered: Begins of the names of those that do not tell that they begin.
     """
-    _Returns.left_out = left_out
+    _Returns.left_out, _Returns.not_entered = left_out, not_entered
     sys.meta_path.insert(0, _Finder)
 
 
@@ -291,6 +304,7 @@ class _Returns(ast.NodeTransformer):
     """Sends what functions return, yield and raise through ``_returning``; a lambda has no name."""
 
     left_out: tuple[str, ...] = LEFT_OUT
+    not_entered: tuple[str, ...] = ("",)
 
     def __init__(self, file: str) -> None:
         self.module = file.removesuffix(".py").replace(os.sep, ".")
@@ -315,6 +329,9 @@ class _Returns(ast.NodeTransformer):
         del self.inside[-2:]
         if self.name and not isinstance(node.body[-1], ast.Return | ast.Raise):
             node.body.append(self._told(ast.Constant(None), node.body[-1]))
+        if self.name and not self.name.startswith(self.not_entered):
+            entered = ast.Expr(ast.Call(ast.Name(ENTERED, ast.Load()), [ast.Constant(self.name)], []))
+            node.body.insert(1 if ast.get_docstring(node) is not None else 0, ast.copy_location(entered, node.body[0]))
         self.name = outer
         return node
 

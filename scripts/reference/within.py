@@ -1,10 +1,12 @@
 """What functions return, yield and raise while a test runs, held against reference/tests.
 
 A test asserts what it is about, and passes through much more. With MICRORAD_WITHIN=hold, as `make within` sets it, a
-test that has passed fails where a function inside of it returns something else than it did. scripts/within writes that.
+test that has passed fails where a function inside of it returns something else than it did, or does so for arguments
+near those of the test (`neighbours`). scripts/within writes that.
 """
 
 import json
+import math
 import os
 import sys
 import time
@@ -14,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from reference import inside
+from reference import inside, neighbours
 
 MODE = os.environ.get("MICRORAD_WITHIN", "")
 """`hold`; or a folder to write values into: those that `held` in it names, or all; or nothing."""
@@ -38,14 +40,61 @@ OF_FILE = 32
 LOOKED = 4 * OF_FILE
 """Values of a function that are looked at for them."""
 
+VARYING_S = 0.5
+"""For varying the calls of a test where it is not known yet which of them will be held."""
 
-class Holding(inside.Watch):
+VARIED = 2
+"""Tests of a file whose first call of a function is made again with arguments that are near."""
+
+
+class Watching(inside.Watch):
+    """Takes from a test what its functions return, and keeps calls to vary them when it has passed."""
+
+    def __init__(self):
+        """Nothing yet."""
+        super().__init__()
+        self._entered = defaultdict(int)
+        self._kept = []
+
+    def enters(self, name, frame):
+        """A function is called: its arguments are copied where that call is varied."""
+        if self._is_busy:
+            return
+        call = self._entered[name] = self._entered[name] + 1
+        if not (numbers := self.varies(name, call)):
+            return
+        self._is_busy = True
+        try:
+            if kept := neighbours.called(frame):
+                self._kept.append((name, call, numbers, kept))
+        finally:
+            self._is_busy = False
+
+    def vary(self, limit_s=math.inf):
+        """What functions return for arguments near those that were kept."""
+        began = time.perf_counter()
+        for name, call, numbers, kept in self._kept:
+            for number, x in neighbours.values(kept, f"{name} {call}", numbers):
+                self.values[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number}"] = x
+            if time.perf_counter() - began > limit_s:
+                return
+
+
+class Holding(Watching):
     """Takes from a test what was held of it."""
 
     def __init__(self, held):
         """Its values, by function and call."""
         super().__init__()
         self._held = {name: {int(call) for call in calls} for name, calls in held.items()}
+        self._varied = defaultdict(lambda: defaultdict(list))
+        for name, calls in self._held.items():
+            for call in sorted(calls) if name.endswith(neighbours.NEIGHBOURS) else ():
+                self._varied[name.removesuffix(neighbours.NEIGHBOURS)][call // 10].append(call % 10)
+
+    def varies(self, name, call):
+        """How the arguments of a call are varied: as it is held."""
+        return self._varied[name].get(call) if name in self._varied else None
 
     def takes(self, name):
         """Which call of a function this is, and 0 where its value is not taken."""
@@ -62,6 +111,7 @@ class OfFile:
         """Nothing yet."""
         self.looked = defaultdict(int)
         self.distinct = defaultdict(set)
+        self.varied = defaultdict(int)
 
     def new(self, values):
         """Those that no test of the file had before."""
@@ -74,13 +124,20 @@ class OfFile:
         return found
 
 
-class Taking(inside.Watch):
+class Taking(Watching):
     """Takes values of each function until its file of tests has enough."""
 
     def __init__(self, of_file):
         """What its file has so far."""
         super().__init__()
         self._of_file = of_file
+
+    def varies(self, name, call):
+        """How the arguments of a call are varied: each way, the first of its test in some tests of a file."""
+        if call > 1 or self._of_file.varied[name] >= VARIED:
+            return None
+        self._of_file.varied[name] += 1
+        return neighbours.EACH
 
     def takes(self, name):
         """Which call of a function this is, and 0 where its value is not taken."""
@@ -143,6 +200,7 @@ class Within:
         finally:
             inside.Watch.current = outer
             os.cpu_count = CORES
+        watch.vary(math.inf if held else VARYING_S)
         if not HOLDS:
             if found := watch.values if held else self._of_file.new(watch.values):
                 with Path(MODE, f"{os.getpid()}.jsonl").open("a", encoding="utf-8") as out:
@@ -197,4 +255,4 @@ def places(item):
 
 
 if MODE:
-    inside.tell(BY_CHANCE)
+    inside.tell(BY_CHANCE, neighbours.LEFT_OUT)
