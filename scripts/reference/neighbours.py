@@ -8,6 +8,7 @@ number a little, one number turned round or 0, a word, a flag, an element that i
 import copy
 import dataclasses
 import enum
+import gc
 import inspect
 import random
 import signal
@@ -46,8 +47,8 @@ LARGEST = 20_000
 MOST_PARTS = 3_000
 """Parts of the arguments of a call, at most."""
 
-LIMIT_S = 0.2
-"""Time for a variation; what takes longer has no value."""
+LIMIT_S, HANG_S = 0.2, 60.0
+"""Time for a variation that is seen for the first time, and for one that is held: what takes longer has no value."""
 
 YIELDED = 50
 """First values of a generator that are looked at."""
@@ -97,13 +98,16 @@ def called(frame: types.FrameType) -> Call | None:
     return function, ([*given[: code.co_argcount], *more], keywords), has_arrays
 
 
-def values(call: Call, seed: str, numbers: Iterable[int] = EACH) -> Iterator[tuple[int, float]]:
+def values(
+    call: Call, seed: str, numbers: Iterable[int] = EACH, limit_s: float = LIMIT_S
+) -> Iterator[tuple[int, float]]:
     """The number of each variation of a call, and one for what it returns, changes or raises.
 
     Args:
         call: A function and its arguments.
         seed: Which decides what is another thing in them.
         numbers: Of the variations.
+        limit_s: Time for one of them.
     """
     function, arguments, has_arrays = call
     for number in numbers:
@@ -111,7 +115,7 @@ def values(call: Call, seed: str, numbers: Iterable[int] = EACH) -> Iterator[tup
         try:
             changed = _Changed(number, has_arrays, rng).of(copy.deepcopy(arguments))
             if changed is not None:
-                yield number, round(inside.value(_within_limit(partial(_returned, function, *changed))), 6)
+                yield number, round(inside.value(_within_limit(partial(_returned, function, *changed), limit_s)), 6)
         except _TooLong:
             return
         except Exception:  # arguments that refuse to be such
@@ -130,12 +134,14 @@ def _returned(function: Callable[..., Any], args: list[Any], keywords: dict[str,
     return [args, keywords] if found is None else found
 
 
-def _within_limit(do: Callable[[], Any]) -> Any:
+def _within_limit(do: Callable[[], Any], limit_s: float) -> Any:
     def stop(*_: object) -> None:
         raise _TooLong
 
+    collects = gc.isenabled()
+    gc.disable()  # what is raised while it collects is lost
     before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, LIMIT_S)
+    signal.setitimer(signal.ITIMER_REAL, limit_s)
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -143,6 +149,8 @@ def _within_limit(do: Callable[[], Any]) -> Any:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+        if collects:
+            gc.enable()
 
 
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, date, timedelta, enum.Enum, range)

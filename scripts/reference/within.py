@@ -40,15 +40,15 @@ OF_FILE = 32
 LOOKED = 4 * OF_FILE
 """Values of a function that are looked at for them."""
 
-VARYING_S = 0.5
-"""For varying the calls of a test where it is not known yet which of them will be held."""
-
 VARIED = 2
 """Tests of a file whose first call of a function is made again with arguments that are near."""
 
 
 class Watching(inside.Watch):
     """Takes from a test what its functions return, and keeps calls to vary them when it has passed."""
+
+    limit_s, varying_s = neighbours.HANG_S, math.inf
+    """Time for one variation, and for those of a test."""
 
     def __init__(self):
         """Nothing yet."""
@@ -70,13 +70,13 @@ class Watching(inside.Watch):
         finally:
             self._is_busy = False
 
-    def vary(self, limit_s=math.inf):
+    def vary(self):
         """What functions return for arguments near those that were kept."""
         began = time.perf_counter()
         for name, call, numbers, kept in self._kept:
-            for number, x in neighbours.values(kept, f"{name} {call}", numbers):
+            for number, x in neighbours.values(kept, f"{name} {call}", numbers, self.limit_s):
                 self.values[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number}"] = x
-            if time.perf_counter() - began > limit_s:
+            if time.perf_counter() - began > self.varying_s:
                 return
 
 
@@ -126,6 +126,8 @@ class OfFile:
 
 class Taking(Watching):
     """Takes values of each function until its file of tests has enough."""
+
+    limit_s, varying_s = neighbours.LIMIT_S, 0.5
 
     def __init__(self, of_file):
         """What its file has so far."""
@@ -200,7 +202,7 @@ class Within:
         finally:
             inside.Watch.current = outer
             os.cpu_count = CORES
-        watch.vary(math.inf if held else VARYING_S)
+        watch.vary()
         if not HOLDS:
             if found := watch.values if held else self._of_file.new(watch.values):
                 with Path(MODE, f"{os.getpid()}.jsonl").open("a", encoding="utf-8") as out:
