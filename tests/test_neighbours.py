@@ -4,6 +4,7 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,8 @@ def call_of(function, *args, **keywords):
     return kept[0]
 
 
+values = partial(neighbours.values, limit_s=neighbours.HANG_S)
+
 SEEN = []
 """What `noted` was given."""
 
@@ -59,7 +62,7 @@ def changes(*args):
     """The numbers of the variations, and the arguments of each."""
     call = call_of(noted, *args)
     SEEN.clear()
-    return [number for number, _ in neighbours.values(call, "noted 1")], [*SEEN]
+    return [number for number, _ in values(call, "noted 1")], [*SEEN]
 
 
 def test_each_number_becomes_another_one_and_one_of_them_turns_round_or_is_0():
@@ -106,9 +109,9 @@ def test_what_a_function_changes_or_raises_counts_and_a_generator_is_looked_into
             yield x
 
     for function, args in [(add, ([], 1.0)), (count, (2.0,))]:
-        found = dict(neighbours.values(call_of(function, *args), "f 1"))
+        found = dict(values(call_of(function, *args), "f 1"))
         assert found[0] != found[1]
-    assert len(set(dict(neighbours.values(call_of(refuse, 2.0), "f 1")).values())) == 4
+    assert len(set(dict(values(call_of(refuse, 2.0), "f 1")).values())) == 4
 
 
 def test_arguments_are_as_they_were_when_the_function_began_and_stay_so():
@@ -118,9 +121,9 @@ def test_arguments_are_as_they_were_when_the_function_began_and_stay_so():
     rest = [1.0, 2.0, 3.0]
     call = call_of(take, rest)
     assert rest == [1.0, 2.0]
-    once = dict(neighbours.values(call, "take 1"))
-    assert once == dict(neighbours.values(call, "take 1"))
-    assert once != dict(neighbours.values(call, "take 2"))
+    once = dict(values(call, "take 1"))
+    assert once == dict(values(call, "take 1"))
+    assert once != dict(values(call, "take 2"))
     assert rest == [1.0, 2.0]
 
 
@@ -128,7 +131,7 @@ def test_keywords_and_more_arguments_are_varied_as_well():
     def of(one, *more, factor=1.0):
         return one * factor + sum(more)
 
-    assert len(dict(neighbours.values(call_of(of, 1.0, 2.0, 3.0, factor=4.0), "of 1"))) == 4
+    assert len(dict(values(call_of(of, 1.0, 2.0, 3.0, factor=4.0), "of 1"))) == 4
 
 
 @pytest.mark.parametrize(
@@ -166,6 +169,6 @@ def test_what_takes_long_is_stopped_and_refused_arguments_have_no_value():
     def width(beam):
         return beam.width
 
-    found = dict(neighbours.values(call_of(width, Beam(3.0)), "w 1"))
+    found = dict(values(call_of(width, Beam(3.0)), "w 1"))
     assert found.keys() >= {0, 1, 3}
     assert 2 not in found, "a beam of no width"

@@ -52,6 +52,8 @@ def code(tmp_path, monkeypatch):
     file = tmp_path / "microrad" / "new.py"
     file.write_text(CODE, encoding="utf-8")
     monkeypatch.setattr(inside._Returns, "not_entered", ("new:refuse",))
+    monkeypatch.setattr(within.Taking, "limit_s", neighbours.HANG_S)
+    monkeypatch.setattr(within.Taking, "varying_s", neighbours.HANG_S)
     loader = inside.Telling("microrad.new", str(file))
     module = module_from_spec(spec_from_loader("microrad.new", loader))
     module.FACTOR = 2.0

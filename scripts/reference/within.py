@@ -26,7 +26,8 @@ REFERENCE = Path(__file__).resolve().parents[2] / "reference" / "tests" if HOLDS
 BY_CHANCE = (
     *("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes"),
     *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
-    *("studio.jobs.", "studio.views.latest:", "studio.guard.names:within", "campaign.engines."),
+    *("studio.jobs.", "studio.views.latest:", "studio.views.runs:time_words", "studio.guard.names:within"),
+    "campaign.engines.",
     "loop.pointing_loop.ensemble:_Advancing",
 )
 """Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the

@@ -802,3 +802,11 @@ def test_a_plant_of_one_axis_says_that_its_sensor_is_slow_and_has_a_gauge_only_w
             assert ("every" in plant.meaning) is (every == 2)
             np.testing.assert_array_equal(plant.system.C[:2], of(pointing, SAMPLED_PLANT).system.C[:2])
             np.testing.assert_array_equal(plant.system.A, of(pointing, SAMPLED_PLANT).system.A)
+
+
+@pytest.mark.parametrize(("bias_v", "said"), [(37.5, "37.5 V"), (0.25, "0.25 V"), (50.0, "50 V")])
+def test_models_of_several_axes_say_the_bias_that_they_count_from_as_it_is(bias_v, said):
+    plain = several_axes.three_actuators()
+    rests = replace(plain, actuators=tuple(replace(each, bias_v=bias_v) for each in plain.actuators))
+    found = matrices.models(choice.source(several_axes.mission(), rests))
+    assert [each.meaning.rpartition(" count from rest at ")[2] for each in found] == [said] * 2

@@ -20,6 +20,9 @@ from microrad.export.flight import double_run, rounding
 from microrad.export.flight.c_code import flight_code, vectors_text
 from microrad.export.linear_part.sections import compensated_states, sections
 from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
+from microrad.loop.pointing_loop.kernel_arrays import forward_arrays
+from microrad.loop.pointing_loop.loop import ForwardHysteresis
+from microrad.mirror.hysteresis import PrandtlIshlinskii
 
 SAMPLES = 2000
 f = np.float32
@@ -490,3 +493,25 @@ def test_a_slow_lag_of_compensated_sums_errs_by_what_a_step_adds_and_not_by_what
     run = SimpleNamespace(lag=np.full((steps, 1), 30.0), added=np.zeros((steps, 1)))
     found = rounding._lag_errors(law, run, np.zeros((steps, 1)))[-1, 0]
     assert 0.0 < found <= 1.01 * steps * (1e-7 * 8.0 * unit * 30.0 + 4.0 * unit**2 * 30.0) < 0.1 * unit * 30.0
+
+
+@pytest.mark.parametrize("powers", [(-0.3, -2.1, -1.7), (0.3, 2.1, -1.7), (-0.3, 2.1, -1.7)])
+def test_a_spring_that_softens_errs_in_a_feedforward_as_one_that_hardens_does(powers):
+    """Its polynomial in single precision, over a swing beyond its reach of 5 V; turned over it errs by as much."""
+
+    def ahead_of(powers):
+        bank = ForwardHysteresis((), (PrandtlIshlinskii((), (), polynomial_rad=powers, reach_v=5.0),), np.ones((1, 1)))
+        system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[0.0], [5e4]]))
+        of = replace(one_axis(system), forward=forward_arrays(bank, 1, PERIOD_S))
+        return rounding.errors_before_converter(of, sections(of), vectors_of(inputs))[:, 0]
+
+    def volts(number):
+        s = np.clip(number(5e4) * number(inputs[:, 0]) / number(5.0), number(-1.0), number(1.0))
+        quadratic, signed, cubic = (number(each) for each in powers)
+        return (quadratic * s * s + signed * np.abs(s) * s + cubic * s * s * s).astype(float)
+
+    inputs = 1.2e-4 * np.sin(2 * np.pi * np.arange(700) / 333.3)[:, None]
+    ahead, wrong = ahead_of(powers), np.abs(volts(np.float32) - volts(np.float64))
+    assert np.all(wrong <= ahead)
+    assert np.max(wrong) > 1e-8
+    assert ahead == pytest.approx(ahead_of(tuple(-each for each in powers)), rel=1e-9, abs=0.0)

@@ -381,3 +381,28 @@ def test_with_a_pole_goes_the_zero_that_is_nearest_to_it():
     found = pole_zero._others(SimpleNamespace(at=at, problem=SimpleNamespace(highest_hz=1e4)))
     without = [one.zeros for one in found if one.poles == poles[1:]]
     assert without == [far, (far[0], Root(105.0, None))]
+
+
+@pytest.mark.parametrize(
+    ("poles_hz", "zeros_hz", "begun"),
+    [
+        ((0.5,), (), "slowest"),
+        ((0.5, 3.0), (0.6,), "slowest"),
+        ((30e3,), (), "highest"),
+        ((0.5, 30e3), (0.7, 400.0), "highest"),
+    ],
+)
+def test_a_fit_whose_poles_are_all_creep_or_far_beyond_the_band_begins_with_one_at_its_end(poles_hz, zeros_hz, begun):
+    """As of a flat mirror; what comes of it is flat, too: nothing of the band is lost in the pole that is left."""
+    drive = swept()
+    flat = response_from_records([measured(drive, GAIN * (drive - drive[0]))])
+    problem = PoleZeroProblem(replace(flat, hold="first-order"), (0.01,), 0.6)
+    poles, zeros = ([complex(-2 * np.pi * hz) for hz in each] for each in (poles_hz, zeros_hz))
+    start = problem.started(poles, zeros, 2e-5)
+    end_hz = {"slowest": 1 / (2 * np.pi * 0.01), "highest": flat.excited_hz[1]}[begun]
+    assert [(pole.frequency_hz, pole.damping) for pole in start.poles] == [(pytest.approx(end_hz), None)]
+    assert start.zeros == () and start.delay_s == 2e-5
+    if begun == "highest":
+        fit = problem.fitted(start)
+        assert fit.gains[0] == pytest.approx(GAIN, rel=2e-2)
+        assert fit.at.poles[0].frequency_hz > 2 * flat.excited_hz[1]

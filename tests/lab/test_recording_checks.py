@@ -16,6 +16,7 @@ from microrad.lab.recording import (
 )
 from microrad.lab.recording.checks import channel, sample_rate
 from microrad.lab.recording.checks.channel import _percent, _trend, clipping, drift, quantum
+from microrad.lab.recording.checks.drive_and_output import excitation
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.formats.source import StatedRate
 from places import DATA
@@ -854,3 +855,13 @@ def test_samples_pile_up_at_a_limit_one_by_one_and_not_in_one_run(step, gather):
     at = 50 + step * np.arange(100)
     values[at] = 1.0
     assert channel._piles_up(values, at, 1.0, 1e-6, 2.0) is gather
+
+
+@pytest.mark.parametrize("samples", [1 << 20, 3 << 19])
+def test_the_excited_band_of_a_long_record_is_that_of_its_sines(samples):
+    """Two sines, over a million samples and half as many again."""
+    turn = 2 * np.pi * np.arange(samples) / RATE_HZ
+    drive = 5.0 + np.sin(120.0 * turn) + np.sin(240.0 * turn)
+    band, moving, (finding,) = excitation([drive], ["the drive"], RATE_HZ, True)
+    assert band == pytest.approx((120.0, 240.0), abs=0.01) and moving == [0]
+    assert "the drive is excited from 120 to 240 Hz" in finding.message and not finding.refused

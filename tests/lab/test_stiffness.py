@@ -1044,3 +1044,31 @@ def test_the_proof_stands_where_the_page_says():
     ):
         assert step in said
     assert springs_of.MOST_SOFTENING == 0.9
+
+
+@pytest.mark.promise("hysteretic-stiffness-11")
+def test_a_search_goes_downhill_where_the_slope_falls_away_from_the_least_cost():
+    """Of x^2 / (1 + x^2) from x = 3: the slope rises over the first steps, which tell no curvature; none is refused."""
+
+    class Bell(Search):
+        def slope(self, free):
+            (x,) = free
+            tried.append(x * x / (1.0 + x * x))
+            return tried[-1], np.array([2.0 * x / (1.0 + x * x) ** 2])
+
+        def cost(self, free):
+            return self.slope(free)[0]
+
+        def curvature(self, free):
+            return np.array([[0.4]])
+
+    one = springs_of.Springs(
+        None, 0, np.eye(1), np.zeros(1), np.array(["phi"]), np.array([-np.inf]), np.array([np.inf])
+    )
+    tried, costs = [], []
+    end = Bell(one, [], np.ones(0), [], None).minimise(
+        np.array([3.0]), 5, 100, lambda done, free, cost: costs.append(cost)
+    )
+    assert tried == [0.9, *costs] and len(costs) == 5
+    assert all(after < before for before, after in itertools.pairwise(tried))
+    assert 0.0 < end[0] < 2.5

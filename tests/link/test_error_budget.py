@@ -902,3 +902,12 @@ def test_the_worst_satellite_lies_three_sigma_or_the_half_width_out_and_away_fro
     turned = Spread("uniform", 2.0, 1.0).times(-2.0)
     assert (turned.shape, turned.mean, turned.width) == ("uniform", -4.0, 2.0)
     assert source("random", 0.0, "gaussian", 0.0).size.worst == 0.0
+
+
+@pytest.mark.parametrize("sigmas", [10.0, 20.0, 40.0])
+def test_what_lies_across_a_mean_of_tens_of_sigma_still_makes_it_longer(sigmas):
+    off = case(2, mean=sigmas * np.array([0.6, 0.8]), covariance=np.eye(2))
+    along = sigmas + stats.norm.ppf(P)
+    wanted = stats.ncx2.ppf(P, 2, sigmas**2) ** 0.5
+    assert wanted - along > 0.01
+    assert alone(off, (0, 1)).quantile(P) == pytest.approx(wanted, rel=1e-6)

@@ -141,3 +141,15 @@ def test_a_gain_below_the_bound_of_the_file_but_beyond_capacity_is_said(tmp_path
     assert "that capacity asks for: no code of this rate does with it" in said
     below = received_with("counting ppm", **light, code_gain=f"{most - 1.5:.2f} dB")
     assert "no code of this rate does with it" not in line_of(budget_of(tmp_path, below), "Required power").warning
+
+
+@pytest.mark.parametrize("given", ["0 rad", "0 deg"])
+@pytest.mark.parametrize("name", COHERENT)
+def test_a_phase_error_that_is_given_as_zero_is_said_to_be_left_at_zero(tmp_path, name, given):
+    budget = budget_of(tmp_path, received_with(name, phase_error=given))
+    line = line_of(budget, PHASE_PENALTY)
+    assert (line.value, line.basis, line.warning) == (0.0, "as given", "left at 0 dB")
+    assert line.source != "not given"
+    assert PHASE_PENALTY in budget.at_zero
+    assert any(PHASE_PENALTY in warning and "left at 0 dB" in warning for warning in budget.warnings)
+    assert budget.margin_db == budget_of(tmp_path, ideal(name)).margin_db

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from microrad import mirror as mirrors
 from microrad.core import lti
-from microrad.loop import control, sine_run
+from microrad.loop import control, coupled_study, sine_run
 from microrad.loop.disturbance import fit_spectrum
 from microrad.loop.workbench import Controller, Loop, tune
 from microrad.mirror.hysteresis import PrandtlIshlinskii
@@ -247,3 +247,15 @@ def test_a_loop_and_a_controller_have_a_rate_that_can_be(rate_hz):
         Loop(mirror=mirror, rate_hz=rate_hz)
     with pytest.raises(ValueError, match="give one axis or more and a rate above 0 Hz"):
         Controller.pid(0.0, 2e6, rate_hz=rate_hz)
+
+
+@pytest.mark.parametrize(("above", "bound_by"), [(1.001, ("modulus margin",)), (1.1, ())])
+def test_a_controller_of_several_axes_just_above_its_margin_is_bound_by_it(monkeypatch, above, bound_by):
+    """The search ends a thousandth above the margin that was asked for."""
+    two = replace(LOOP, mirror=mirrors.combine(STRAIGHT, STRAIGHT))
+    pid = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=2)
+    ended = control.WholeController("LQG", pid.system, pid.anti_windup)
+    monkeypatch.setattr(coupled_study, "tuned_whole", lambda *given: (ended, {"integral": 5e6}))
+    tuned = tune(two, "LQG", modulus_margin=LOOP.margins(SLOW).modulus / above)
+    assert_allclose(tuned.margins.modulus, LOOP.margins(SLOW).modulus, rtol=1e-6)
+    assert tuned.bound_by == bound_by

@@ -1337,3 +1337,12 @@ def test_elements_hold_for_fourteen_days_to_the_end(tmp_path, sign):
     state, which = ("expired", "newer") if sign > 0 else ("not valid yet", "older")
     with pytest.raises(OrbitError, match=rf"the elements are {state}: .* 14\.00 days .* take {which} elements"):
         orbit.states(np.array([0.0, limit + sign * 1e-3]))
+
+
+def test_an_ephemeris_within_a_combined_message_is_found(tmp_path):
+    first, body = oem_xml(GRID).split("\n", 1)
+    found = ephemeris(tmp_path, f"{first}\n<ndm><MESSAGE_ID>one of several</MESSAGE_ID>\n{body}\n</ndm>")
+    time_s = np.linspace(0.0, 6000.0, 13)
+    position_m, velocity_m_s = truth(time_s)
+    np.testing.assert_allclose(found.states(time_s).position_m, position_m, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(found.states(time_s).velocity_m_s, velocity_m_s, rtol=0, atol=1e-5)
