@@ -1202,3 +1202,19 @@ def test_a_rows_receiver_has_its_drawn_phase_error_and_loss(tmp_path):
         assert 0.1 <= loss <= 1.0
         margins.append(float(link.margin_of_error(link.of(m), 1e-5)))
     assert np.all(np.diff(np.asarray(margins)[np.argsort(phases)]) < 0.0)
+
+
+def test_every_wrong_key_and_value_of_a_grid_is_told_at_once(tmp_path):
+    grid = """[grid]
+"terminals.leo_aperture" = "5 cm"
+"terminals.geo_apertures" = ["15 cm"]
+"communication.pointing_error" = ["1 kg"]
+"""
+    told = {fault.key: fault.reason for fault in faults(tmp_path, HEAD + POWER + grid)}
+    assert list(told) == [
+        "grid.terminals.leo_aperture",
+        "grid.terminals.geo_apertures",
+        "grid.communication.pointing_error",
+    ]
+    wrong = ("is not a list", "is no key", "another kind")
+    assert [words in reason for words, reason in zip(wrong, told.values(), strict=True)] == [True] * 3

@@ -960,3 +960,13 @@ def test_limits_of_a_body_that_turns_to_its_partner_have_no_boresight_and_cut_no
     assert (found.attitude, found.boresight, found.field_of_regard_rad) == ("free", UNLIMITED.boresight, math.pi)
     assert math.degrees(found.slew_limit_rad_s) == pytest.approx(2.0)
     assert (math.degrees(found.sun_exclusion_rad), found.in_eclipse) == (pytest.approx(6.0), False)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 9.0, -15.0])
+def test_a_partner_in_a_slot_stands_above_its_longitude_also_above_greenwich(tmp_path, degrees):
+    m = day_file(tmp_path, ALONE, {"orbit.geo.longitude": f"{degrees:g} deg"}).mission
+    partner = orbit.pair(m.orbit, m.terminals, tmp_path).geo.orbit
+    x, y, z = partner.states(np.zeros(1)).position_m[:, 0]
+    east = math.atan2(y, x) - partner.epoch.earth_rotation_rad(0.0)
+    assert math.degrees(math.remainder(east, 2.0 * math.pi)) == pytest.approx(degrees, abs=1e-6)
+    assert z == pytest.approx(0.0, abs=1.0)

@@ -842,3 +842,15 @@ def test_without_files_the_data_name_none(full):
     assert (data["mirror_file"], data["report_file"]) == (None, None)
     both = report.identification_data(full, full.chosen, mirror_file=Path("a.toml"), report_file=Path("b.html"))
     assert (both["mirror_file"], both["report_file"]) == ("a.toml", "b.html")
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_data_say_whether_the_output_rises_or_falls_with_the_drive(sign):
+    """The weights of its play operators are those of a mirror that rises."""
+    drive = 5.0 - 5.0 * np.cos(2.0 * np.pi * 5.0 * np.arange(1200) / RATE_HZ)
+    output = sign * 1e-4 * play_response(drive, np.array([0.0, 1.0]), np.zeros(2)) @ np.array([0.8, 0.2])
+    of = recording_from_arrays(drive, output, RATE_HZ, "slow.csv")
+    found = identify([of], hold_out=0.5, models=("prandtl_ishlinskii",))
+    plays = report.identification_data(found, found.chosen)["parameters"]["prandtl_ishlinskii"]
+    assert plays["sign"] == sign
+    assert sum(plays["weights_rad_v"]) > 0.0

@@ -21,7 +21,9 @@ import pytest
 
 from microrad.campaign.statistics import sensitivity, tails
 from microrad.core import integrity
+from microrad.core.kept import Kept
 from microrad.core.units import format_quantity
+from microrad.lab.identify import records
 from microrad.lab.identify.linear import fit, uncertainty
 from microrad.lab.identify.selection import warnings
 from microrad.link import gains
@@ -54,6 +56,7 @@ from microrad.report.verification.checks import measured
 from microrad.report.verification.evidence import Comparison, Referent
 from microrad.report.view import Points, View
 from microrad.studio.views import link as studio_link
+from microrad.study import study as mission_study
 from shipped import plain_study
 
 REFERENCES = sorted((Path(__file__).resolve().parents[2] / "reference").glob("*.json"))
@@ -290,6 +293,7 @@ FAULTS = {  # a mistake in the product, and the check that has to see it
     "ranks": (sensitivity, "_ranks", lambda _: lambda x: x, "sensitivities"),
     "first index": (sensitivity, "_ratio", lambda of: lambda s: tuple(0.85 * x for x in of(s)), "sensitivities"),
     "error of a zero": (uncertainty, "_zero_errors", lambda of: lambda *a: 1.41 * of(*a), "known-mirror"),
+    "fastest rate": (records, "_fastest_rate", lambda of: lambda *a: 1.02 * of(*a), "known-plays"),
     "correlations": (warnings, "_correlations", lambda of: lambda *a: 0.9 * of(*a), "known-colour"),
 }
 
@@ -1266,3 +1270,10 @@ def test_a_placard_that_a_sign_tells_is_not_told_again(monkeypatch):
     monkeypatch.setattr(foundation, "placards", lambda sources: [])
     assert not any(isinstance(block, Points) for block in blocks())
     assert "All inputs lie where the parts of the chain were held against independent methods." in blocks()
+
+
+def test_a_study_of_the_evidence_takes_the_parts_that_it_is_given(tmp_path, monkeypatch):
+    parts = Kept(tmp_path / "parts")
+    monkeypatch.setattr(mission_study, "run_study", lambda m, **given: (m, given))
+    of = workspace.Workspace(tmp_path, None, parts)
+    assert of.study == (load_mission(of.mission_path), {"parts": parts})

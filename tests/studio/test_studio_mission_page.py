@@ -803,3 +803,13 @@ def test_a_report_is_shown_in_a_frame_that_says_what_it_is_of(tab, monkeypatch):
     assert (frame.props["src"], frame.props["title"]) == ("/files/found/report.html", "found")
     viewer.show("/files/later/report.html", "later")
     assert [each.props["title"] for each in viewer.place.descendants() if each.tag == "iframe"] == ["later"]
+
+
+def test_faults_that_are_corrected_are_listed_no_more(session, opened):
+    page = opened()
+    session.change(session.draft.with_text(TEXT + "k1 = 1\nk2 = 1\n"))
+    page._faults()
+    assert texts(page.faults)[0] == "2 faults to correct"
+    session.change(session.draft.with_text(TEXT))
+    page._faults()
+    assert texts(page.faults) == ["No faults."]
