@@ -925,3 +925,21 @@ def test_extremes_keep_order_ends_and_peaks():
     assert 100 <= len(rows) <= 102 + 100
     assert extremes([wave[:50]], 100).tolist() == list(range(50))
     assert math.isclose(len(extremes([wave[:101]], 100)), 101, abs_tol=1)
+
+
+def test_a_recording_whose_finding_is_accepted_is_drawn_and_one_whose_finding_is_not_is_refused(tmp_path):
+    wave = np.sin(2 * np.pi * 7.3 * np.arange(1500) / 1e3)
+    np.save(tmp_path / "a.npy", np.stack([wave, np.minimum(wave, 0.5)], axis=1))
+
+    def seen(*accept):
+        columns = {"inputs": [0], "outputs": [1], "rate_hz": 1e3, "accept": list(accept)}
+        return process.view(tmp_path / "a.npy", {"columns": columns, "limits": {"samples": 1500, "points": 100}})
+
+    for accept in ((), ("drift",)):
+        with pytest.raises(ValueError, match="To take it on as it is: --accept clipping "):
+            seen(*accept)
+    found = seen("clipping")
+    np.testing.assert_allclose(found["output"][0], np.minimum(wave[found["rows"]], 0.5), atol=1e-6)
+    assert max(found["output"][0]) == 0.5
+    alike = f"{np.count_nonzero(wave >= 0.5)} samples at exactly that value"
+    assert any("is clipped at 0.5" in words and alike in words for words in found["findings"])
