@@ -12,6 +12,7 @@ from places import ROOT
 from reference import inside, neighbours, within
 
 CODE = """
+from contextlib import suppress
 from functools import cache
 
 @cache
@@ -23,6 +24,13 @@ def part(x):
 
 def refuse(x):
     raise ValueError(f"{x} is too much")
+
+def comes_back(x):
+    while x != 3.0:
+        with suppress(BaseException):
+            while True:
+                pass
+    return x
 
 class Kept:
     @staticmethod
@@ -221,3 +229,15 @@ def test_how_long_functions_are_is_told_by_the_names_that_they_are_held_by():
     lengths = script().lengths()
     assert {"core.kept:Kept.part", "core.folder:read_bytes.<locals>.at_once", "core.budget:total_db"} <= lengths.keys()
     assert all(lines >= 0 for lines in lengths.values())
+
+
+def test_arguments_that_keep_a_function_for_ever_are_given_up_and_the_test_goes_on(code, tmp_path, monkeypatch):
+    """It comes back from no signal, as compiled code does not."""
+    monkeypatch.setattr(within, "MODE", str(tmp_path))
+    monkeypatch.setattr(within, "HOLDS", False)
+    monkeypatch.setattr(within, "REFERENCE", tmp_path / "held")
+    monkeypatch.setattr(within.Taking, "varying_s", 0.2)
+    watched(within.Within(), lambda: code.comes_back(3.0))
+    ((_, _, _, found),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
+    assert found.keys() == {"new:comes_back"}
+    assert within.FORKED.active_children() == []

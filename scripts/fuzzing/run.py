@@ -21,9 +21,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
-from types import FrameType
 from typing import Any, Protocol
 
+from fuzzing.limits import TooLongError, timer
 from fuzzing.properties import DocumentedError
 
 _SILENT_S = 300.0  # until a child that finishes no case is taken to hang where no signal reaches it
@@ -44,10 +44,6 @@ class Format(Protocol):
 
     def take(self, made: Any, folder: Path) -> None:
         """Read it and check what comes of it; raises a refusal, or AssertionError for a property that is broken."""
-
-
-class TooLongError(BaseException):
-    """A case was ended by its timer; it is no Exception, so that nothing takes it for one of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +104,7 @@ def judged(kind: Format, made: Any, folder: Path, most_s: float) -> tuple[bool, 
         most_s: Processor time that it may take.
     """
     try:
-        with _timer(most_s), warnings.catch_warnings():
+        with timer(most_s), warnings.catch_warnings():
             warnings.simplefilter("error")
             kind.take(made, folder)
     except (Exception, TooLongError) as error:
@@ -135,22 +131,6 @@ def _place(error: BaseException) -> str:
     """The last line of microrad that an error passed."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "/microrad/" in f.filename]
     return f" at {frames[-1].filename.partition('/microrad/')[2]}, {frames[-1].name}" if frames else ""
-
-
-@contextmanager
-def _timer(most_s: float) -> Iterator[None]:
-    """Raise `TooLongError` in what takes more processor time."""
-
-    def ring(number: int, frame: FrameType | None) -> None:
-        raise TooLongError(f"more than {most_s:g} s")
-
-    before = signal.signal(signal.SIGPROF, ring)
-    signal.setitimer(signal.ITIMER_PROF, most_s)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def here(kind: Format, seed: int, numbers: Sequence[int], most_s: float) -> Tally:

@@ -294,7 +294,7 @@ def tell(left_out: tuple[str, ...] = LEFT_OUT, not_entered: tuple[str, ...] = ("
 
     Args:
         left_out: Begins of the names of functions that do not.
-        not_entered: Begins of the names of those that do not tell that they begin.
+        not_entered: Begins of the names of those that do not tell that they begin; without it none does.
     """
     _Returns.left_out, _Returns.not_entered = left_out, not_entered
     sys.meta_path.insert(0, _Finder)

@@ -11,12 +11,12 @@ import enum
 import gc
 import inspect
 import random
-import signal
 import types
 import warnings
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from datetime import date, timedelta
 from functools import partial
 from itertools import islice
@@ -24,13 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from fuzzing.limits import TooLongError, timer
 from reference import inside
 
 NEIGHBOURS = "~"
 """Behind the name of a function, for what it returns for arguments that are near."""
-
-ENTERING = "__microrad_entering__"
-"""Name under which a module finds whom it tells of a call."""
 
 NUMBERS, WORDS, ELEMENTS = (0, 1, 2, 3), (4, 5), (6, 7)
 """Variations of the arguments of a call: what becomes another thing in them."""
@@ -48,7 +46,7 @@ MOST_PARTS = 3_000
 """Parts of the arguments of a call, at most."""
 
 LIMIT_S, HANG_S = 0.2, 60.0
-"""Time for a variation that is seen for the first time, and for one that is held: what takes longer has no value."""
+"""Processor time of a variation that is seen for the first time, and of one that is held: beyond it has no value."""
 
 YIELDED = 50
 """First values of a generator that are looked at."""
@@ -64,10 +62,6 @@ LEFT_OUT = (
 Arguments = tuple[list[Any], dict[str, Any]]
 Call = tuple[types.FunctionType, Arguments, bool]
 """A function, its arguments and whether there are arrays among them."""
-
-
-class _TooLong(BaseException):
-    """A variation has used up its time."""
 
 
 class _UncopiedError(Exception):
@@ -114,9 +108,12 @@ def values(
         rng = random.Random(zlib.crc32(f"{seed} {number}".encode()))
         try:
             changed = _Changed(number, has_arrays, rng).of(copy.deepcopy(arguments))
-            if changed is not None:
-                yield number, round(inside.value(_within_limit(partial(_returned, function, *changed), limit_s)), 6)
-        except _TooLong:
+            if changed is None:
+                continue
+            with _quietly(), timer(limit_s):
+                found = _returned(function, *changed)
+            yield number, round(inside.value(found), 6)
+        except TooLongError:
             return
         except Exception:  # arguments that refuse to be such
             continue
@@ -127,28 +124,20 @@ def _returned(function: Callable[..., Any], args: list[Any], keywords: dict[str,
         found = function(*args, **keywords)
         if isinstance(found, types.GeneratorType):
             found = list(islice(found, YIELDED))
-        elif inspect.iscoroutine(found):
-            found.close()
     except Exception as error:
         return [type(error).__name__, str(error)]
     return [args, keywords] if found is None else found
 
 
-def _within_limit(do: Callable[[], Any], limit_s: float) -> Any:
-    def stop(*_: object) -> None:
-        raise _TooLong
-
+@contextmanager
+def _quietly() -> Iterator[None]:
     collects = gc.isenabled()
     gc.disable()  # what is raised while it collects is lost
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, limit_s)
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return do()
+            yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
         if collects:
             gc.enable()
 

@@ -6,12 +6,14 @@ near those of the test (`neighbours`). scripts/within writes that.
 """
 
 import json
-import math
 import os
 import sys
 import time
+import warnings
 import zlib
 from collections import defaultdict
+from contextlib import suppress
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -27,13 +29,13 @@ BY_CHANCE = (
     *("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes"),
     *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
     *("studio.jobs.", "studio.views.latest:", "studio.views.runs:time_words", "studio.guard.names:within"),
-    "campaign.engines.",
-    "loop.pointing_loop.ensemble:_Advancing",
+    *("campaign.engines.", "loop.pointing_loop.ensemble:_Advancing"),
 )
 """Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the
 package, or name the place where Python is."""
 
 CORES = os.cpu_count
+FORKED = get_context("fork")
 
 OF_FILE = 32
 """Values of a function that are written of a file of tests, each unlike the others."""
@@ -48,8 +50,8 @@ VARIED = 2
 class Watching(inside.Watch):
     """Takes from a test what its functions return, and keeps calls to vary them when it has passed."""
 
-    limit_s, varying_s = neighbours.HANG_S, math.inf
-    """Time for one variation, and for those of a test."""
+    limit_s = neighbours.HANG_S
+    """Processor time of one variation."""
 
     def __init__(self):
         """Nothing yet."""
@@ -73,12 +75,14 @@ class Watching(inside.Watch):
 
     def vary(self):
         """What functions return for arguments near those that were kept."""
-        began = time.perf_counter()
+        for name, call, x in self.varied():
+            self.values[name][call] = x
+
+    def varied(self):
+        """The same, one by one: a function and its mark, its call and variation, a value."""
         for name, call, numbers, kept in self._kept:
             for number, x in neighbours.values(kept, f"{name} {call}", numbers, self.limit_s):
-                self.values[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number}"] = x
-            if time.perf_counter() - began > self.varying_s:
-                return
+                yield f"{name}{neighbours.NEIGHBOURS}", f"{call}{number}", x
 
 
 class Holding(Watching):
@@ -128,7 +132,8 @@ class OfFile:
 class Taking(Watching):
     """Takes values of each function until its file of tests has enough."""
 
-    limit_s, varying_s = neighbours.LIMIT_S, 0.5
+    limit_s, varying_s = neighbours.LIMIT_S, 2.0
+    """Processor time of one variation, and time for all of a test."""
 
     def __init__(self, of_file):
         """What its file has so far."""
@@ -141,6 +146,28 @@ class Taking(Watching):
             return None
         self._of_file.varied[name] += 1
         return neighbours.EACH
+
+    def vary(self):
+        """In a child: arguments that no caller gives may keep compiled code for ever, or end the process."""
+        if not self._kept:
+            return
+        ours, theirs = FORKED.Pipe(duplex=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a child leaves alone
+            child = FORKED.Process(target=self._send, args=(theirs,))
+            child.start()
+        theirs.close()
+        end = time.monotonic() + self.varying_s
+        with ours, suppress(EOFError):
+            while ours.poll(max(end - time.monotonic(), 0.0)):
+                name, call, x = ours.recv()
+                self.values[name][call] = x
+        child.kill()
+        child.join()
+
+    def _send(self, theirs):
+        for each in self.varied():
+            theirs.send(each)
 
     def takes(self, name):
         """Which call of a function this is, and 0 where its value is not taken."""
