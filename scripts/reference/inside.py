@@ -70,12 +70,12 @@ STEADY = 5e-5
 LEFT_OUT = (
     *("cli.", "core.folder:read_bytes.<locals>.at_once", "core.units:printable", "campaign.run:_minutes"),
     *("report.page.", "report.identification.page:identification_page", "core.folder:write_whole"),
-    "core.folder:_left_behind",
+    *("core.folder:_left_behind", "core.machine:_processor"),
     *("export.flight.build:", "export.flight.write:", "loop.pointing_loop.ensemble:_Drawing"),
     *("campaign.engines.", "mission.explain:_used", "loop.pointing_loop.ensemble:_Advancing"),
 )
-"""What they return hangs on the time, the compiler, threads, on which of two processes is first, on how the code is
-written, is the number of an open file, or a whole page."""
+"""What they return hangs on the time, the machine, the compiler, threads, on which of two processes is first, on how
+the code is written, is the number of an open file, or a whole page."""
 
 _FOLDERS = rf"{re.escape(str(Path(__file__).parents[2]))}|/\S*?/pytest-\d+/(?:popen-gw\d+/)?[^/\s]*?\d+\b"
 _CHANGING = re.compile(rf"{_FOLDERS}|[0-9a-f]{{12,64}}|\b\d+\.\d+\.\d+(?:\.dev\d+)?(?:\+\w+)?")

@@ -561,3 +561,13 @@ def test_the_margins_of_the_whole_are_told_as_those_of_one_loop():
     assert (told.gain_down, told.gain_up) == pytest.approx((0.6, 5.0 / 3.0), rel=1e-12)
     assert told.phase_rad == pytest.approx(2.0 * math.atan(0.25), rel=1e-12)
     assert all(math.isnan(each) for each in (told.delay_s, told.crossover_hz, told.peak_hz))
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-14, 1e-9, 1e-4, 0.5, 0.999999])
+def test_least_singular_values_have_all_their_digits_where_both_are_alike(apart):
+    """Of U diag(1, 1 - apart) V^H times 0.6, with U and V drawn; and of a matrix of zeros."""
+    rng = np.random.default_rng(11)
+    drawn = rng.standard_normal((2, 50, 2, 2)) + 1j * rng.standard_normal((2, 50, 2, 2))
+    left, right = np.linalg.qr(drawn)[0]
+    matrices = 0.6 * left @ np.diag([1.0, 1.0 - apart]) @ right
+    assert_allclose(np.sqrt(whole.least_squares(matrices)), 0.6 * (1.0 - apart), rtol=1e-15 / (1.0 - apart) + 4e-15)

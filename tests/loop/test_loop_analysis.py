@@ -598,3 +598,17 @@ def test_of_several_crossings_the_gain_margins_are_those_nearest_to_one():
     freq = np.linspace(5.0, 45.0, 401) + 1e-3
     up, down = analysis._gain_margins(response, freq, response(freq))
     assert (up, down) == (pytest.approx(2.0, rel=1e-6), pytest.approx(1.0 / 1.6, rel=1e-6))
+
+
+@pytest.mark.parametrize("apart", [1e-15, 1e-9, 3e-4])
+def test_poles_that_are_the_same_but_for_rounding_count_once(apart):
+    """And twice where they are apart: by a half of their half width."""
+    pole = np.exp(2 * math.pi * PERIOD * (-5.0 + 400.0j))
+
+    def points(relative):
+        second = np.exp(2 * math.pi * PERIOD * (-5.0 + 400.0j + 5.0 * relative))
+        return analysis.around_poles(np.array([second, pole, 0.9]), PERIOD, 1.1)
+
+    alone = analysis.around_poles(np.array([pole]), PERIOD, 1.1)
+    assert_allclose(np.sort(points(apart)), np.sort(alone), rtol=apart)
+    assert points(0.5).size > 1.9 * alone.size

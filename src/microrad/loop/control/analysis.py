@@ -23,6 +23,9 @@ BREAKS = ("command", "optical")
 
 _POINTS = 1000
 
+SAME_POLE = 1e-3
+"""Poles that are nearer to each other, over their half width, have the same frequencies around them."""
+
 NEAR_LEAST = 1.3
 """Dips within this factor of the deepest point of a grid may be deeper than it between the points."""
 
@@ -302,6 +305,9 @@ def real_at_half_the_rate(L: Complexes, cycles: Floats) -> Complexes:
 def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
     """Frequencies (Hz) around discrete poles: from a fifth of the half width away, then each a constant factor farther.
 
+    Poles that are the same but for rounding, as those of axes that are alike, count once: between their frequencies no
+    parabola has digits.
+
     Args:
         poles: Poles z of a discrete system; those on the positive real axis have no resonance and are passed over.
         period_s: Control period, s.
@@ -309,8 +315,12 @@ def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
     """
     s = np.log(poles[np.abs(poles) > 1e-3].astype(complex)) / (2 * math.pi * period_s)
     found = []
-    for pole in s[s.imag > 0.0]:
+    s = s[s.imag > 0.0]
+    s = s[np.argsort(s.imag)]
+    for k, pole in enumerate(s):
         centre, width = pole.imag, max(abs(pole.real), 1e-6 * pole.imag)
+        if np.any(np.abs(s[:k] - pole) < SAME_POLE * width):
+            continue
         reach = math.log(max(5.0 * centre / width, 2.0))
         away = 0.2 * width * np.exp(np.linspace(0.0, reach, math.ceil(reach / math.log(ratio)) + 1))
         found += [centre - away, [centre], centre + away]

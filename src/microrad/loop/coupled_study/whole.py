@@ -141,10 +141,18 @@ def _returned(plant: WholePlant, system: lti.StateSpace, freq: Floats) -> Comple
 
 
 def least_squares(matrices: Complexes) -> Floats:
-    """Squares of the least singular values of matrices of two rows and columns, shape (matrices, 2, 2)."""
+    """Squares of the least singular values of matrices of two rows and columns, shape (matrices, 2, 2).
+
+    Each has all its digits also where both singular values are alike, as those of axes that are: the square of their
+    difference is |M - t adj(M)^H|^2 / 2, with t the determinant over its magnitude, and no difference of large numbers.
+    """
+    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
     squares = np.sum(matrices.real**2 + matrices.imag**2, axis=(1, 2))
-    area = np.abs(_determinant(matrices)) ** 2
-    return np.asarray(2.0 * area / (squares + np.sqrt(np.maximum(squares**2 - 4.0 * area, 0.0))))
+    determinant = _determinant(matrices)
+    size = np.abs(determinant)
+    t = np.divide(determinant, size, out=np.ones_like(determinant), where=size > 0.0)
+    largest = 0.5 * (np.sqrt(squares + 2.0 * size) + np.hypot(np.abs(a - t * d.conj()), np.abs(b + t * c.conj())))
+    return np.asarray((size / largest) ** 2)
 
 
 def _determinant(matrices: Complexes) -> Complexes:
