@@ -48,7 +48,7 @@ def call_of(function, *args, **keywords):
     return kept[0]
 
 
-values = partial(neighbours.values, limit_s=neighbours.HANG_S)
+values = partial(neighbours.values, numbers=range(neighbours.KINDS), limit_s=neighbours.HANG_S)
 
 SEEN = []
 """What `noted` was given."""
@@ -164,7 +164,7 @@ def test_what_takes_long_is_stopped_and_refused_arguments_have_no_value():
         while x != 2.0:
             pass
 
-    assert dict(neighbours.values(call_of(forever, 2.0), "f 1")) == {}
+    assert dict(neighbours.values(call_of(forever, 2.0), "f 1", [0, 1])) == {}
 
     def width(beam):
         return beam.width
@@ -172,3 +172,50 @@ def test_what_takes_long_is_stopped_and_refused_arguments_have_no_value():
     found = dict(values(call_of(width, Beam(3.0)), "w 1"))
     assert found.keys() >= {0, 1, 3}
     assert 2 not in found, "a beam of no width"
+
+
+def test_a_higher_number_is_another_variation_of_the_same_kind_and_the_last_one_the_call_itself():
+    call = call_of(noted, 2.0, 3.0)
+    SEEN.clear()
+    numbers = [2, 2 + neighbours.KINDS, 2 + 2 * neighbours.KINDS, neighbours.SAME]
+    assert [number for number, _ in neighbours.values(call, "noted 1", numbers, neighbours.HANG_S)] == numbers
+    assert {*SEEN[:3]} == {(-2.0, 3.0), (2.0, -3.0)}
+    assert SEEN[3] == (2.0, 3.0)
+
+
+def capped(x, most):
+    return most if x > most else x
+
+
+def test_a_call_shows_the_mistakes_with_which_it_returns_something_else(monkeypatch):
+    """Those that none before it has shown."""
+    monkeypatch.setattr(neighbours.mistakes, "OF_A_LINE", 99)
+    call = call_of(capped, 2.0, 3.0)
+    shown = neighbours.Shown(call[0])
+    every = set(shown.left)
+    x, first = shown.by(call, ([2.0, 3.0], {}), neighbours.HANG_S)
+    assert x == dict(neighbours.values(call, "f", [neighbours.SAME], neighbours.HANG_S))[neighbours.SAME]
+    assert first
+    assert shown.left == every - set(first)
+    assert shown.by(call, ([2.0, 3.0], {}), neighbours.HANG_S) == (x, [])
+    _, second = shown.by(call, ([4.0, 3.0], {}), neighbours.HANG_S)
+    assert second
+    assert not set(first) & set(second)
+
+
+def twice_as_long(x, times):
+    while x < 8.0:
+        x = x * times
+    return x
+
+
+def test_a_mistake_with_which_a_call_does_not_end_is_not_shown_by_it(monkeypatch):
+    """Such as `x = x / times`; the others are tried all the same."""
+    monkeypatch.setattr(neighbours.mistakes, "OF_A_LINE", 99)
+    call = call_of(twice_as_long, 2.0, 2.0)
+    shown = neighbours.Shown(call[0])
+    every = set(shown.left)
+    _, seen = shown.by(call, ([2.0, 2.0], {}), 0.2)
+    assert seen
+    assert shown.left == every - set(seen)
+    assert shown.left

@@ -92,11 +92,13 @@ def held(code, tmp_path, monkeypatch):
     monkeypatch.setattr(within, "HOLDS", False)
     monkeypatch.setattr(within, "REFERENCE", tmp_path / "held")
     watched(within.Within(), lambda: all_of(code))
-    ((file, test, took_s, found),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
+    ((file, test, took_s, found, shown),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
     assert (file, test) == ("link/test_x.py", f"{zlib.crc32(b'test_it[1.5]'):08x}")
     assert took_s >= 0.0
-    assert found.keys() == {"new:once", "new:part", "new:part~", "new:Kept.method", "new:refuse!"}
-    assert found["new:part~"].keys() == {f"1{number}" for number in neighbours.NUMBERS}
+    again = {"new:once~", "new:part~", "new:Kept.method~"}
+    assert found.keys() == {"new:once", "new:part", "new:Kept.method", "new:refuse!", *again}
+    assert shown.keys() == again
+    assert all(found[name].keys() == shown[name].keys() >= {f"1{neighbours.SAME}"} for name in again)
     values = {name: {f"{test}.{call}": x for call, x in calls.items()} for name, calls in found.items()}
     inside.save(tmp_path / "held" / "link" / "test_x.txt", values)
     monkeypatch.setattr(within, "HOLDS", True)
@@ -123,7 +125,8 @@ def test_a_function_that_returns_something_else_fails_the_test_by_name(code, hel
         watched(held, lambda: all_of(code))
     lines = str(failed.value).splitlines()
     assert [line.partition(" returns ")[0] for line in lines[:-1]] == [
-        f"test_it[1.5]: inside of it new:{name}" for name in ("Kept.method", "once", "part", "part~")
+        f"test_it[1.5]: inside of it new:{name}"
+        for name in ("Kept.method", "Kept.method~", "once", "once~", "part", "part~")
     ]
     assert lines[-1] == "Where that is meant: scripts/within tests/link/test_x.py"
     assert inside.Watch.current is None
@@ -182,7 +185,7 @@ def test_what_a_fixture_computes_is_held_as_well_unless_it_is_of_all_files(code,
     if scope == "session":
         assert not [*tmp_path.glob("*.jsonl")]
         return
-    ((_, key, _, found),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
+    ((_, key, _, found, _),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
     values = {name: {f"{key}.{call}": x for call, x in calls.items()} for name, calls in found.items()}
     inside.save(tmp_path / "held" / "link" / "test_x.txt", values)
     asked = within.Within()
@@ -238,6 +241,6 @@ def test_arguments_that_keep_a_function_for_ever_are_given_up_and_the_test_goes_
     monkeypatch.setattr(within, "REFERENCE", tmp_path / "held")
     monkeypatch.setattr(within.Taking, "varying_s", 0.2)
     watched(within.Within(), lambda: code.comes_back(3.0))
-    ((_, _, _, found),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
+    ((_, _, _, found, _),) = map(json.loads, next(tmp_path.glob("*.jsonl")).read_text().splitlines())
     assert found.keys() == {"new:comes_back"}
     assert within.FORKED.active_children() == []

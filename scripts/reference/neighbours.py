@@ -2,7 +2,8 @@
 
 A test calls a function with numbers that are round or alike, lists of one element, words that are right. When the test
 has passed, what was called is called again with copies of its arguments in which something is another thing: each
-number a little, one number turned round or 0, a word, a flag, an element that is left out or there twice.
+number a little, one number turned round or 0, a word, a flag, an element that is left out or there twice. Of these
+calls those are worth holding that return something else where there is a mistake (`mistakes`) that no other call shows.
 """
 
 import copy
@@ -25,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from fuzzing.limits import TooLongError, timer
-from reference import inside
+from reference import inside, mistakes
 
 NEIGHBOURS = "~"
 """Behind the name of a function, for what it returns for arguments that are near."""
@@ -33,8 +34,11 @@ NEIGHBOURS = "~"
 NUMBERS, WORDS, ELEMENTS = (0, 1, 2, 3), (4, 5), (6, 7)
 """Variations of the arguments of a call: what becomes another thing in them."""
 
-EACH = (*NUMBERS, *WORDS, *ELEMENTS)
-"""All of them."""
+KINDS = len(NUMBERS + WORDS + ELEMENTS)
+"""Of variations; a variation of a higher number is another one of the same kind, with other things drawn."""
+
+SAME = 99
+"""The number of the call as it was."""
 
 ALL = NUMBERS[:2]
 """Those in which each number is another one; in the others it is one thing."""
@@ -45,8 +49,11 @@ LARGEST = 20_000
 MOST_PARTS = 3_000
 """Parts of the arguments of a call, at most."""
 
-LIMIT_S, HANG_S = 0.2, 60.0
+LIMIT_S, HANG_S = 0.1, 60.0
 """Processor time of a variation that is seen for the first time, and of one that is held: beyond it has no value."""
+
+APART = 1e-2
+"""By how much what is returned with a mistake is another thing."""
 
 YIELDED = 50
 """First values of a generator that are looked at."""
@@ -92,31 +99,72 @@ def called(frame: types.FrameType) -> Call | None:
     return function, ([*given[: code.co_argcount], *more], keywords), has_arrays
 
 
-def values(
-    call: Call, seed: str, numbers: Iterable[int] = EACH, limit_s: float = LIMIT_S
-) -> Iterator[tuple[int, float]]:
+def values(call: Call, seed: str, numbers: Iterable[int], limit_s: float = LIMIT_S) -> Iterator[tuple[int, float]]:
     """The number of each variation of a call, and one for what it returns, changes or raises.
 
     Args:
         call: A function and its arguments.
         seed: Which decides what is another thing in them.
-        numbers: Of the variations.
+        numbers: Of the variations, below ``SAME``, or that.
         limit_s: Time for one of them.
     """
-    function, arguments, has_arrays = call
     for number in numbers:
-        rng = random.Random(zlib.crc32(f"{seed} {number}".encode()))
         try:
-            changed = _Changed(number, has_arrays, rng).of(copy.deepcopy(arguments))
-            if changed is None:
-                continue
-            with _quietly(), timer(limit_s):
-                found = _returned(function, *changed)
-            yield number, round(inside.value(found), 6)
+            if (changed := varied(call, seed, number)) is not None:
+                yield number, returned(call[0], changed, limit_s)
         except TooLongError:
             return
         except Exception:  # arguments that refuse to be such
             continue
+
+
+def varied(call: Call, seed: str, number: int) -> Arguments | None:
+    """Arguments of a call in which something is another thing; nothing where there is no such thing in them."""
+    _, arguments, has_arrays = call
+    copied = copy.deepcopy(arguments)
+    if number == SAME:
+        return copied
+    rng = random.Random(zlib.crc32(f"{seed} {number}".encode()))
+    return _Changed(number % KINDS, has_arrays, rng).of(copied)
+
+
+def returned(function: Callable[..., Any], arguments: Arguments, limit_s: float) -> float:
+    """A number for what a function returns, changes or raises; raises TooLongError."""
+    with _quietly(), timer(limit_s):
+        found = _returned(function, *arguments)
+    return round(inside.value(found), 6)
+
+
+class Shown:
+    """Mistakes in a function that calls of it show, one after the other."""
+
+    def __init__(self, function: types.FunctionType) -> None:
+        """None yet."""
+        self._wrong = dict(enumerate(mistakes.of(function.__code__)))
+        self.left = set(self._wrong)
+
+    def by(self, call: Call, changed: Arguments, limit_s: float = LIMIT_S) -> tuple[float, list[int]]:
+        """What a call returns with these arguments, and the mistakes with which it returns something else.
+
+        Args:
+            call: A function and its arguments.
+            changed: The arguments in place of them.
+            limit_s: Time for one call; raises TooLongError without a mistake.
+        """
+        function = call[0]
+        x = returned(function, copy.deepcopy(changed), limit_s)
+        shown = []
+        for number in sorted(self.left):
+            cells = function.__closure__ if self._wrong[number].co_freevars else None
+            wrong = types.FunctionType(self._wrong[number], function.__globals__, function.__name__, None, cells)
+            try:
+                other = returned(wrong, copy.deepcopy(changed), limit_s)
+            except TooLongError:
+                continue
+            if abs(other - x) > APART:
+                shown.append(number)
+        self.left.difference_update(shown)
+        return x, shown
 
 
 def _returned(function: Callable[..., Any], args: list[Any], keywords: dict[str, Any]) -> Any:

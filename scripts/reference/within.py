@@ -5,6 +5,7 @@ test that has passed fails where a function inside of it returns something else 
 near those of the test (`neighbours`). scripts/within writes that.
 """
 
+import faulthandler
 import json
 import os
 import sys
@@ -18,6 +19,7 @@ from pathlib import Path
 
 import pytest
 
+from fuzzing.limits import TooLongError
 from reference import inside, neighbours
 
 MODE = os.environ.get("MICRORAD_WITHIN", "")
@@ -43,8 +45,17 @@ OF_FILE = 32
 LOOKED = 4 * OF_FILE
 """Values of a function that are looked at for them."""
 
-VARIED = 2
-"""Tests of a file whose first call of a function is made again with arguments that are near."""
+TRIED = 40
+"""Calls of a function that are made again, at most."""
+
+VARIED = 3
+"""Those that are made again with arguments that are near, too."""
+
+NEAR_EACH = 16
+"""Variations of each of these."""
+
+TRIED_S = 1.0
+"""Time for a function."""
 
 
 class Watching(inside.Watch):
@@ -82,7 +93,7 @@ class Watching(inside.Watch):
         """The same, one by one: a function and its mark, its call and variation, a value."""
         for name, call, numbers, kept in self._kept:
             for number, x in neighbours.values(kept, f"{name} {call}", numbers, self.limit_s):
-                yield f"{name}{neighbours.NEIGHBOURS}", f"{call}{number}", x
+                yield f"{name}{neighbours.NEIGHBOURS}", f"{call}{number:02d}", x
 
 
 class Holding(Watching):
@@ -95,7 +106,7 @@ class Holding(Watching):
         self._varied = defaultdict(lambda: defaultdict(list))
         for name, calls in self._held.items():
             for call in sorted(calls) if name.endswith(neighbours.NEIGHBOURS) else ():
-                self._varied[name.removesuffix(neighbours.NEIGHBOURS)][call // 10].append(call % 10)
+                self._varied[name.removesuffix(neighbours.NEIGHBOURS)][call // 100].append(call % 100)
 
     def varies(self, name, call):
         """How the arguments of a call are varied: as it is held."""
@@ -116,58 +127,106 @@ class OfFile:
         """Nothing yet."""
         self.looked = defaultdict(int)
         self.distinct = defaultdict(set)
-        self.varied = defaultdict(int)
 
     def new(self, values):
-        """Those that no test of the file had before."""
+        """Those that no test of the file had before; calls that show a mistake are each another one."""
         found = defaultdict(dict)
         for name, calls in values.items():
             for call, x in calls.items():
-                if round(x, 2) not in self.distinct[name]:
+                if name.endswith(neighbours.NEIGHBOURS) or round(x, 2) not in self.distinct[name]:
                     self.distinct[name].add(round(x, 2))
                     found[name][call] = x
         return found
 
 
-class Taking(Watching):
-    """Takes values of each function until its file of tests has enough."""
+class Tried:
+    """Calls of a function that were made again, with mistakes."""
 
-    limit_s, varying_s = neighbours.LIMIT_S, 2.0
+    def __init__(self):
+        """None yet."""
+        self.calls = 0
+        self.took_s = 0.0
+        self.shown = None
+
+    def is_worth_it(self):
+        """Whether a mistake is left, and time to look for it."""
+        looked = self.shown is None or bool(self.shown.left)
+        return looked and self.calls < TRIED and self.took_s < TRIED_S
+
+    def numbers(self):
+        """Of the variations of the call that is the next."""
+        if self.calls > VARIED:
+            return ()
+        return [k % neighbours.SAME for k in range(NEAR_EACH * self.calls, NEAR_EACH * (self.calls + 1))]
+
+
+class Taking(Watching):
+    """Takes values of each function until its file of tests has enough, and calls that show a mistake."""
+
+    limit_s, varying_s = neighbours.LIMIT_S, 4.0
     """Processor time of one variation, and time for all of a test."""
 
-    def __init__(self, of_file):
-        """What its file has so far."""
+    def __init__(self, of_file, tried):
+        """What its file has so far, and of each function the calls that were made again in this process."""
         super().__init__()
-        self._of_file = of_file
+        self._of_file, self.tried = of_file, tried
+        self.shown = defaultdict(dict)
 
     def varies(self, name, call):
-        """How the arguments of a call are varied: each way, the first of its test in some tests of a file."""
-        if call > 1 or self._of_file.varied[name] >= VARIED:
+        """How the arguments of a call are varied; nothing where it is not made again."""
+        tried = self.tried[name]
+        if call > 2 or not tried.is_worth_it():
             return None
-        self._of_file.varied[name] += 1
-        return neighbours.EACH
+        tried.calls += 1
+        return [neighbours.SAME, *tried.numbers()]
 
     def vary(self):
-        """In a child: arguments that no caller gives may keep compiled code for ever, or end the process."""
-        if not self._kept:
-            return
+        """Calls again, first each as it was, until the time is over."""
+        end = time.monotonic() + self.varying_s
+        for name, _, _, (function, *_) in self._kept:
+            if self.tried[name].shown is None:
+                self.tried[name].shown = neighbours.Shown(function)
+        calls = [(name, call, numbers[0], kept) for name, call, numbers, kept in self._kept]
+        calls += [(name, call, number, kept) for name, call, numbers, kept in self._kept for number in numbers[1:]]
+        while calls and time.monotonic() < end:
+            calls = calls[self._made_again(calls, end) :]
+            if calls and time.monotonic() < end:
+                self.tried[calls.pop(0)[0]].took_s = TRIED_S  # it has ended the process
+
+    def _made_again(self, calls, end):
+        """How many calls were made again, in a child: arguments that no caller gives, or mistakes, may end it."""
         ours, theirs = FORKED.Pipe(duplex=False)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of threads, which a child leaves alone
-            child = FORKED.Process(target=self._send, args=(theirs,))
+            child = FORKED.Process(target=self._send, args=(theirs, calls))
             child.start()
         theirs.close()
-        end = time.monotonic() + self.varying_s
+        made = 0
         with ours, suppress(EOFError):
-            while ours.poll(max(end - time.monotonic(), 0.0)):
-                name, call, x = ours.recv()
-                self.values[name][call] = x
+            while made < len(calls) and ours.poll(max(end - time.monotonic(), 0.0)):
+                x, shown, took_s = ours.recv()
+                name, call, number, _ = calls[made]
+                made += 1
+                self.tried[name].took_s += took_s
+                if shown:
+                    self.tried[name].shown.left.difference_update(shown)
+                    self.values[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number:02d}"] = x
+                    self.shown[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number:02d}"] = shown
         child.kill()
         child.join()
+        return made
 
-    def _send(self, theirs):
-        for each in self.varied():
-            theirs.send(each)
+    def _send(self, theirs, calls):
+        """What each returns, the mistakes that it shows, and seconds."""
+        faulthandler.disable()
+        for name, call, number, kept in calls:
+            tried, began, of = self.tried[name], time.monotonic(), (0.0, [])
+            if tried.shown.left and tried.took_s < TRIED_S:
+                with suppress(Exception, TooLongError):  # arguments that refuse to be such, or that take too long
+                    if (changed := neighbours.varied(kept, f"{name} {call}", number)) is not None:
+                        of = tried.shown.by(kept, changed, self.limit_s)
+            tried.took_s += time.monotonic() - began
+            theirs.send((*of, time.monotonic() - began))
 
     def takes(self, name):
         """Which call of a function this is, and 0 where its value is not taken."""
@@ -186,6 +245,7 @@ class Within:
         self._file = ""
         self._held = Held()
         self._of_file = OfFile()
+        self._tried = defaultdict(Tried)
         self._caches = Caches()
 
     def pytest_collection_modifyitems(self, items):
@@ -220,7 +280,7 @@ class Within:
         held = self._held[file].get(test, {})
         if not held and (HOLDS or REFERENCE.exists()):
             return (yield)
-        watch, outer = Holding(held) if held else Taking(self._of_file), inside.Watch.current
+        watch, outer = Holding(held) if held else Taking(self._of_file, self._tried), inside.Watch.current
         self._caches.clear()
         os.cpu_count = lambda: 1  # work is cut into parts by their number, and threads take turns
         inside.Watch.current = watch
@@ -230,11 +290,13 @@ class Within:
         finally:
             inside.Watch.current = outer
             os.cpu_count = CORES
+        took_s = time.perf_counter() - began
         watch.vary()
         if not HOLDS:
             if found := watch.values if held else self._of_file.new(watch.values):
+                shown = {} if held else watch.shown
                 with Path(MODE, f"{os.getpid()}.jsonl").open("a", encoding="utf-8") as out:
-                    out.write(json.dumps([file, test, time.perf_counter() - began, found]) + "\n")
+                    out.write(json.dumps([file, test, took_s, found, shown]) + "\n")
         elif moved := inside.moved(name, held, watch.values):
             pytest.fail("\n".join([*moved, f"Where that is meant: scripts/within tests/{file}"]), pytrace=False)
         return result
