@@ -159,6 +159,14 @@ def test_a_function_inside_of_another_one_and_an_enumeration_are_left_alone():
     assert changes(Way.UP) == ([], [])
 
 
+def test_a_call_that_would_tell_its_test_something_again_is_not_made_again():
+    told = []
+    assert call_of(lambda on_progress: on_progress(1.0), told.append) is None
+    assert call_of(lambda on_progress: on_progress(1.0), lambda x: told.append(x)) is None  # noqa: PLW0108
+    assert told == [1.0, 1.0]
+    assert call_of(lambda scale: scale(1.0), lambda x: 2.0 * x) is not None
+
+
 def test_what_takes_long_is_stopped_and_refused_arguments_have_no_value():
     def forever(x):
         while x != 2.0:

@@ -32,9 +32,11 @@ BY_CHANCE = (
     *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
     *("studio.jobs.", "studio.views.latest:", "studio.views.runs:time_words", "studio.guard.names:within"),
     *("campaign.engines.", "loop.pointing_loop.ensemble:_Advancing"),
+    *("campaign.rows.evaluate:_counts", "export.flight.build:", "export.flight.write:_cycles"),
+    "export.flight.stack:deepest.<locals>.below",
 )
-"""Functions whose values hang on the time or on threads, are numbers of open files, change with each edit of the
-package, or name the place where Python is."""
+"""Functions whose values hang on the time, on threads or on the order of a set, are numbers of open files, change with
+each edit of the package, or name the place where Python is."""
 
 CORES = os.cpu_count
 FORKED = get_context("fork")
@@ -45,8 +47,11 @@ OF_FILE = 32
 LOOKED = 4 * OF_FILE
 """Values of a function that are looked at for them."""
 
-TRIED = 40
-"""Calls of a function that are made again, at most."""
+FIRST_CALLS = 5
+"""Of a function in a test, that may be made again."""
+
+COPIED = 500
+"""Calls of a function whose arguments are copied, at most; those of the same arguments are made again once."""
 
 VARIED = 3
 """Those that are made again with arguments that are near, too."""
@@ -144,20 +149,25 @@ class Tried:
 
     def __init__(self):
         """None yet."""
-        self.calls = 0
+        self.copied = 0
+        self.given = set()
         self.took_s = 0.0
         self.shown = None
 
     def is_worth_it(self):
         """Whether a mistake is left, and time to look for it."""
-        looked = self.shown is None or bool(self.shown.left)
-        return looked and self.calls < TRIED and self.took_s < TRIED_S
+        is_left = self.shown is None or bool(self.shown.left)
+        return is_left and self.copied < COPIED and self.took_s < TRIED_S
 
-    def numbers(self):
-        """Of the variations of the call that is the next."""
-        if self.calls > VARIED:
+    def numbers(self, arguments):
+        """How a call is made again with its arguments: as it was, and the first ones in variations, too."""
+        x = inside.value(arguments)
+        if x in self.given:
             return ()
-        return [k % neighbours.SAME for k in range(NEAR_EACH * self.calls, NEAR_EACH * (self.calls + 1))]
+        self.given.add(x)
+        k = len(self.given)
+        more = range(NEAR_EACH * k, NEAR_EACH * (k + 1)) if k <= VARIED else ()
+        return (neighbours.SAME, *(number % neighbours.SAME for number in more))
 
 
 class Taking(Watching):
@@ -173,12 +183,12 @@ class Taking(Watching):
         self.shown = defaultdict(dict)
 
     def varies(self, name, call):
-        """How the arguments of a call are varied; nothing where it is not made again."""
+        """Whether a call may be made again: how is decided when its test has passed."""
         tried = self.tried[name]
-        if call > 2 or not tried.is_worth_it():
+        if call > FIRST_CALLS or not tried.is_worth_it():
             return None
-        tried.calls += 1
-        return [neighbours.SAME, *tried.numbers()]
+        tried.copied += 1
+        return (neighbours.SAME,)
 
     def vary(self):
         """Calls again, first each as it was, until the time is over."""
@@ -186,8 +196,9 @@ class Taking(Watching):
         for name, _, _, (function, *_) in self._kept:
             if self.tried[name].shown is None:
                 self.tried[name].shown = neighbours.Shown(function)
-        calls = [(name, call, numbers[0], kept) for name, call, numbers, kept in self._kept]
-        calls += [(name, call, number, kept) for name, call, numbers, kept in self._kept for number in numbers[1:]]
+        again = [(name, call, self.tried[name].numbers(kept[1]), kept) for name, call, _, kept in self._kept]
+        calls = [(name, call, number, kept) for name, call, numbers, kept in again for number in numbers[:1]]
+        calls += [(name, call, number, kept) for name, call, numbers, kept in again for number in numbers[1:]]
         while calls and time.monotonic() < end:
             calls = calls[self._made_again(calls, end) :]
             if calls and time.monotonic() < end:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from types import SimpleNamespace
 
@@ -400,3 +401,20 @@ def test_a_worker_without_a_nanny_is_sent_away():
         ("run", address | {"nanny": True}),
         ("retire", address | {"close_workers": True, "remove": True}),
     ]
+
+
+@pytest.mark.parametrize("error", [CancelledError, OSError, TimeoutError])
+def test_a_result_that_cannot_be_fetched_is_computed_again(error):
+    """Its worker died, or its connection broke, behind the end of the job."""
+    again = []
+
+    def result(timeout):
+        raise error
+
+    engine = SimpleNamespace(
+        _futures={3: SimpleNamespace(result=result)},
+        _wait_for_scheduler=lambda: again.append("waited"),
+        _again=lambda serial, queue: again.append((serial, queue)),
+    )
+    assert list(DaskEngine._finished(engine, 3, "queue")) == []
+    assert again == ["waited", (3, "queue")]

@@ -6,10 +6,12 @@ import pickle
 import re
 from contextlib import nullcontext, suppress
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
 from microrad import link
@@ -1218,3 +1220,58 @@ def test_every_wrong_key_and_value_of_a_grid_is_told_at_once(tmp_path):
     ]
     wrong = ("is not a list", "is no key", "another kind")
     assert [words in reason for words, reason in zip(wrong, told.values(), strict=True)] == [True] * 3
+
+
+def test_a_key_that_one_cell_of_a_grid_reads_may_be_drawn(tmp_path, monkeypatch):
+    """Whichever it is; in no cell it would change no number."""
+
+    def of_gaussian_beams(file, runs, names):
+        mission = file.mission
+        return mission.communication.transmit_power_w if mission.conventions.pointing_loss == "gaussian" else 0.0
+
+    monkeypatch.setattr(evaluate, "outputs", of_gaussian_beams)
+    for order in ('"gain", "gaussian"', '"gaussian", "gain"'):
+        loaded(tmp_path, HEAD + POWER + f'[grid]\n"conventions.pointing_loss" = [{order}]\n')
+    (found,) = faults(tmp_path, HEAD + POWER + '[grid]\n"conventions.pointing_loss" = ["gain"]\n')
+    assert found.reason.startswith("is read by nothing that is kept (")
+
+
+def test_files_that_a_key_draws_are_sought_beside_the_mission(tmp_path):
+    """The campaign may lie in another folder."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
+    changes = (('\nspectrum = "olympus"', '\nspectrum = "table"\nfile = "a.csv"'),)
+    drawn = '[inputs."fine_pointing.vibration.file"]\ndistribution = "table"\nvalues = ["a.csv", "b.csv"]\n'
+    path = written(there, HEAD.replace("mission.toml", "../there/mission.toml") + LOOP + drawn, changes=changes)
+    for name in ("a.csv", "b.csv"):
+        (there / name).write_text("Hz, urad^2/Hz\n1, 1\n2, 1\n", encoding="utf-8")
+    found = load_campaign(path.rename(here / "campaign.toml"))
+    assert {"a.csv", "b.csv"} <= {file.name for file in found.files}
+    (there / "b.csv").unlink()
+    with pytest.raises(MissionError) as caught:
+        load_campaign(here / "campaign.toml")
+    assert [(Path(fault.value.strip('"')).name, fault.reason) for fault in caught.value.faults] == [
+        ("b.csv", "is named by the mission and does not exist")
+    ]
+
+
+def test_weights_of_inputs_that_are_drawn_from_other_distributions_multiply(tmp_path):
+    """Each is the ratio of both densities at what was drawn."""
+    text = HEAD
+    for key, (mean, deviation), (other, wider) in (
+        ("communication.transmit_power", (5.0, 0.2), (4.7, 0.4)),
+        ("communication.pointing_error", (3.0, 0.1), (3.2, 0.3)),
+    ):
+        unit = "W" if key.endswith("power") else "urad"
+        text += f'[inputs."{key}"]\ndistribution = "normal"\nmean = "{mean} {unit}"\ndeviation = "{deviation} {unit}"\n'
+        text += f'[inputs."{key}".drawn_as]\ndistribution = "normal"\nmean = "{other} {unit}"\n'
+        text += f'deviation = "{wider} {unit}"\n'
+    columns, weights = sampling.rows(loaded(tmp_path, text), 0, 0, 64)
+    power, error = columns["communication.transmit_power"], columns["communication.pointing_error"] * 1e6
+    ratios = [
+        norm.pdf(power, 5.0, 0.2) / norm.pdf(power, 4.7, 0.4),
+        norm.pdf(error, 3.0, 0.1) / norm.pdf(error, 3.2, 0.3),
+    ]
+    assert weights == pytest.approx(ratios[0] * ratios[1], rel=1e-9)
+    assert np.abs(np.log(ratios[0])).max() > 0.5

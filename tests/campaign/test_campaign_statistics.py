@@ -499,3 +499,10 @@ def test_what_is_said_of_rows_lost_extrapolated_and_weighted() -> None:
 )
 def test_the_loop_of_a_campaign_in_words(axes, mirror, runs, words) -> None:
     assert summary._loop_words(SimpleNamespace(controller="PI", axes=axes, mirror=mirror), runs) == words
+
+
+@pytest.mark.parametrize("value", [-2.0, 2.0])
+def test_values_that_are_all_the_same_have_one_bin_about_them_whatever_their_sign(value):
+    edges, counts = histogram(np.full(3, value), np.ones(3))
+    assert edges == pytest.approx([value - 2e-3, value + 2e-3], abs=1e-12)
+    assert counts.tolist() == [3.0]

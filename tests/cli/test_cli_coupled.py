@@ -4,11 +4,14 @@ import functools
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from microrad.cli import recordings
+from microrad.cli.coupled import refuse_options
+from microrad.cli.frame import Refusal
 from microrad.lab.identify import IdentificationError, coupled, response_from_records
 from microrad.lab.identify.coupled.ladder import LadderOptions, identify_coupled
 from microrad.lab.identify.coupled.wiring import check_wiring
@@ -457,3 +460,12 @@ def test_places_of_three_sensors_agree_with_any_response_and_a_line_of_them_is_r
 )
 def test_what_a_mirror_of_several_files_is_called(folder, files, name):
     assert recordings.common_name([Path(file) for file in files]) == name
+
+
+def test_an_option_for_one_drive_and_one_output_is_refused_with_the_numbers_of_each():
+    given = SimpleNamespace(channels=(3, 2))
+    refuse_options(given, {"--static": False})
+    with pytest.raises(
+        Refusal, match="--seed is for one drive and one output, and these recordings have 3 and 2: leave"
+    ):
+        refuse_options(given, {"--static": False, "--seed": True})

@@ -26,7 +26,7 @@ from microrad.export.flight import c_code, double_run, learning_run
 from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
 from microrad.export.flight.fixed_form import readings
 from microrad.export.flight.operations import fixed_operations, operations
-from microrad.export.flight.rounding import UNIT, errors_before_converter, rounding_bound
+from microrad.export.flight.rounding import UNIT, behind_converter, errors_before_converter, rounding_bound
 from microrad.export.linear_part.sections import sections
 from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop.loop import with_adaptation
@@ -193,6 +193,7 @@ def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     print(f"whole numbers add {r.error_v:.2g} V, what learns in single precision up to {r.inverse_v:.2g} V")
     assert 1e-8 < r.error_v < 1e-5 < r.inverse_v < 1e-4
     assert r.bound_v <= 2.01 * of.resolution_v
+    assert r.bound_v == pytest.approx(behind_converter(of, np.array([r.error_v + r.inverse_v]))[0], rel=1e-12)
     assert "The inverse, in single precision, adds up to" in quantisation_text(fixed)
     for file, text in fixed_code(of, sections(of), fixed, "flown").items():
         (tmp_path / file).write_text(text)

@@ -320,3 +320,16 @@ def test_real_arrays():
     assert [(r.drive.shape, r.output.shape, r.period_samples) for r in read] == [((16384, 3), (16384, 3), 8192)] * 6
     np.testing.assert_array_equal(read[4].output[8192:], np.load(y)[:, :, 4, 1])
     assert {f.kind for r in read for f in r.findings} == {"unexcited"}
+
+
+def test_a_period_has_to_fit_into_the_part_that_is_read(tmp_path):
+    """Where no axis counts the periods: a part of 0.3 s has 300 of the 400 samples, one behind the last included."""
+    path = tmp_path / "a.npz"
+    write_npz(path, u=U[..., 0], y=Y[..., 0], fs=RATE_HZ)
+    options = {"axes": AXES[:3], "part_s": (0.0, 0.3), "alone": False}
+    found = read_arrays(path, "u", "y", period_samples=250, **options)
+    assert {each.period_samples for each in found} == {250}
+    count = len(found[0].drive)
+    assert 300 <= count <= 301
+    told = refusal(path, "u", "y", period_samples=350, **options)
+    assert f"a period of 350 samples does not fit into {count} samples" in told

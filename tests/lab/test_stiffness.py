@@ -1072,3 +1072,30 @@ def test_a_search_goes_downhill_where_the_slope_falls_away_from_the_least_cost()
     assert tried == [0.9, *costs] and len(costs) == 5
     assert all(after < before for before, after in itertools.pairwise(tried))
     assert 0.0 < end[0] < 2.5
+
+
+def test_numbers_that_records_do_not_tell_apart_leave_unseen_errors_alone(monkeypatch):
+    """Two move the output alike but for a part in 1e5: what is unseen is that of their sum, not of their difference."""
+    rng = np.random.default_rng(5)
+    slopes, errors, apart = rng.standard_normal((3, 4, 12))
+    parts = {}
+    for k in range(4):
+        jacobian = np.stack([slopes[k], slopes[k] + 1e-5 * apart[k]], axis=1)
+        parts[k] = SimpleNamespace(
+            cost=errors[k] @ errors[k], matrix=jacobian.T @ jacobian, gradient=jacobian.T @ errors[k]
+        )
+    monkeypatch.setattr(tangents, "play_plant", lambda *given: None)
+    monkeypatch.setattr(tangents, "normal_equations", lambda plant, numbers, record, wanted: parts[record.number])
+    records = [SimpleNamespace(number=k, step_s=1.0, output=np.zeros((12, 1))) for k in range(4)]
+    springs = SimpleNamespace(numbers=lambda free: None, matrix=np.eye(2), inside=lambda free: slice(None))
+    search = SimpleNamespace(
+        records=records, springs=springs, weights=np.ones(4), wanted=slice(None), pool=SimpleNamespace(map=map)
+    )
+    unseen, moved = fit_of._other_records(search, np.zeros(2), [0, 0, 0, 0])
+    matrices, pulls = np.sum(slopes**2, axis=1), np.sum(slopes * errors, axis=1)
+    steps = pulls / (matrices.sum() - matrices)
+    costs = np.sum(errors**2, axis=1) + 2.0 * pulls * steps + steps**2 * matrices
+    np.testing.assert_allclose(unseen, np.sqrt(costs / 12), rtol=1e-3)
+    alone = (pulls - pulls.mean()) / matrices.sum() * np.sqrt(4 / 3)
+    np.testing.assert_allclose(moved.sum(axis=1), alone, rtol=1e-3, atol=1e-3 * np.abs(alone).max())
+    np.testing.assert_allclose(moved[:, 0], moved[:, 1], rtol=1e-3, atol=1e-3 * np.abs(alone).max())

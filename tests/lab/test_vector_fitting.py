@@ -232,3 +232,13 @@ def test_band_limited_cannot_be_stepped():
     assert simulate(model, np.ones((5, 1)), 100.0).shape == (5, 1)
     with pytest.raises(IdentificationError, match="choose the zero-order hold"):
         simulate(model, np.ones((5, 1)), 100.0, "band-limited")
+
+
+@pytest.mark.parametrize("factor", [2.0**-50, 1.0, 2.0**50])
+def test_a_fit_ends_when_it_is_exact_whatever_the_size_of_its_weights(factor):
+    freq = np.geomspace(1.0, 4000.0, 300)
+    truth = mirror(seed=3).response(freq)
+    fit = vector_fit(freq, truth, 9, weight=np.full(freq.size, factor))
+    assert fit.converged
+    assert 1 < fit.iterations < 30
+    np.testing.assert_allclose(fit.response(freq), truth, rtol=1e-8, atol=1e-8 * np.abs(truth).max())

@@ -2,6 +2,7 @@
 
 from dataclasses import astuple, replace
 from math import exp, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -413,3 +414,18 @@ def test_a_reversal_every_ten_samples_counts_and_one_every_eleven_does_not():
     for half, counted in ((10, True), (11, False)):
         cycle = np.abs(np.arange(20 * half) % (2 * half) - half).astype(float)[:, None]
         assert (simulate.alternations(cycle, 0.1) > 0) == counted
+
+
+@pytest.mark.parametrize(
+    ("saturated", "slewed", "words"),
+    [
+        (0, 0, ""),
+        (0, 3, "the amplifier's slew limit"),
+        (50, 0, "the amplifier's limits (25 % of the samples)"),
+        (50, 3, "the amplifier's limits (25 % of the samples)"),
+    ],
+)
+def test_what_an_amplifier_held_back_is_its_limits_before_its_slew_limit(saturated, slewed, words):
+    counts = SimpleNamespace(saturated=saturated, slew_limited=slewed)
+    trace = SimpleNamespace(counts=counts, time_s=np.zeros(200))
+    assert tracking.Run(None, "PID", 25.0, trace).at_limits == words

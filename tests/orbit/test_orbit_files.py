@@ -1346,3 +1346,12 @@ def test_an_ephemeris_within_a_combined_message_is_found(tmp_path):
     position_m, velocity_m_s = truth(time_s)
     np.testing.assert_allclose(found.states(time_s).position_m, position_m, rtol=0, atol=1e-3)
     np.testing.assert_allclose(found.states(time_s).velocity_m_s, velocity_m_s, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("time_s", [math.inf, -math.inf, math.nan])
+def test_a_time_that_is_no_number_is_refused_as_such_by_an_ephemeris(tmp_path, time_s):
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID))
+    with pytest.raises(OrbitError, match="a time is not a finite number; give seconds since"):
+        orbit.states(np.array([700.0, time_s]))
+    with pytest.raises(OrbitError, match="a time is not a finite number; give seconds since"):
+        orbit.require(700.0, time_s)

@@ -1238,3 +1238,17 @@ def test_a_sensitivity_has_the_margin_that_is_asked_for_where_one_is():
         figures._ceiling(panel, ns(fine_pointing=table))
         assert [rule.label for rule in panel.all_of(Rule)] == labels
         assert [rule.at for rule in panel.all_of(Rule)] == [1.0, 2.0][: len(labels)]
+
+
+def test_of_several_axes_whose_stroke_is_short_the_one_with_the_least_margin_is_told(fine):
+    """Its need and its stroke, not those of the first one."""
+    first, second = (
+        replace(axis, usable_travel_rad=share * axis.usable_travel_rad)
+        for axis, share in zip(fine.scene.stroke, (0.5, 0.1), strict=True)
+    )
+    assert not first.fits
+    assert second.margin_rad < first.margin_rad
+    said = words.short(replace(fine, scene=replace(fine.scene, stroke=(first, second))), REQUIRED_RAD)[-1]
+    need, have = words.angle(second.needed_rad), words.angle(second.available_rad)
+    assert said.endswith(f"{second.label} needs {need} to either side and has {have}.")
+    assert have != words.angle(first.available_rad)
