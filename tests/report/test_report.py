@@ -804,3 +804,10 @@ def test_a_list_of_errors_is_in_the_summary_where_the_study_has_one(monkeypatch)
     assert "error_budget" not in report.summary(replace(of, error_budget=None))
     monkeypatch.setattr(study_data, "budget_data", lambda budget: {"of": budget})
     assert report.summary(replace(of, error_budget="a list"))["error_budget"] == {"of": "a list"}
+
+
+@pytest.mark.parametrize(("rate_bit_s", "words"), [(622.08e6, "622.08"), (0.4e6, "0.4"), (300e6, "300")])
+def test_the_data_rate_of_this_mission_keeps_its_digits_below_the_papers(rate_bit_s, words):
+    mission = SimpleNamespace(name="ours", communication=SimpleNamespace(data_rate_bit_s=rate_bit_s))
+    table = paper_views.projects_table(SimpleNamespace(file=SimpleNamespace(mission=mission)))
+    assert table.rows[-1] == ("", "this mission: ours", "", words, "")

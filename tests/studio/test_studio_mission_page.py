@@ -6,6 +6,7 @@ import threading
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -813,3 +814,20 @@ def test_faults_that_are_corrected_are_listed_no_more(session, opened):
     session.change(session.draft.with_text(TEXT))
     page._faults()
     assert texts(page.faults) == ["No faults."]
+
+
+def test_a_table_offers_the_keys_that_it_lacks_and_none_of_one_whose_name_begins_alike(monkeypatch):
+    """Keys outside of all tables are offered beside those that stand there."""
+    drawn = MagicMock()
+    monkeypatch.setattr(mission_form, "ui", drawn)
+    absent = [SimpleNamespace(key=key, required=False) for key in ("orbit.epoch", "orbits.kind", "name")]
+    absent[0].required = True
+    session = SimpleNamespace(draft=SimpleNamespace(absent=absent))
+    for table, offered in (
+        ("orbit", {"orbit.epoch": "orbit.epoch (needed)"}),
+        (mission_form.ROOT, {"name": "name"}),
+        ("link", None),
+    ):
+        drawn.reset_mock()
+        mission_form.Form._more(SimpleNamespace(session=session, table=table, _add=None))
+        assert [call.args[0] for call in drawn.select.call_args_list] == ([] if offered is None else [offered])

@@ -1245,3 +1245,13 @@ def test_whoever_waits_on_a_page_that_is_gone_is_ended(monkeypatch, deleted, sto
         except asyncio.CancelledError:
             found = True
         assert found == gone
+
+
+def test_the_files_of_an_identification_are_opened_by_their_links(session, job_view):
+    """The report is the second of its results, the mirror file the first."""
+    view = job_view
+    view.jobs, view.read = [identified(session.folder, 7, "done")], {"7": fits("a")}
+    view.end_of = ("a", ("the verdict",))
+    asyncio.run(view.look())
+    links = {each.text: each.props["href"] for each in view.end.descendants() if isinstance(each, ui.link)}
+    assert links == {"Open the report": "/results/7/1", "Mirror file stage.toml": "/results/7/0"}

@@ -943,3 +943,24 @@ def test_a_recording_whose_finding_is_accepted_is_drawn_and_one_whose_finding_is
     assert max(found["output"][0]) == 0.5
     alike = f"{np.count_nonzero(wave >= 0.5)} samples at exactly that value"
     assert any("is clipped at 0.5" in words and alike in words for words in found["findings"])
+
+
+def test_a_reader_is_bounded_before_it_reads(monkeypatch, tmp_path):
+    """Else a hostile file would have all memory and time."""
+    did, answer = [], tmp_path / "answer"
+    stub = SimpleNamespace(
+        dup=lambda fd: os.open(answer, os.O_WRONLY | os.O_CREAT),
+        dup2=lambda *fds: None,
+        open=lambda *given: 0,
+        fdopen=os.fdopen,
+        devnull=os.devnull,
+        O_WRONLY=os.O_WRONLY,
+    )
+    monkeypatch.setattr(process, "os", stub)
+    monkeypatch.setattr(process, "limit", lambda limits: did.append(("limit", limits)))
+    monkeypatch.setattr(process, "answer_to", lambda request: did.append("read") or {"x": 1})
+    request = io.BytesIO(json.dumps({"limits": {"cpu_s": 1}}).encode())
+    monkeypatch.setattr(process.sys, "stdin", SimpleNamespace(buffer=request))
+    process.main()
+    assert did == [("limit", {"cpu_s": 1}), "read"]
+    assert json.loads(answer.read_text()) == {"x": 1}
