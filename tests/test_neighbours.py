@@ -201,12 +201,12 @@ def test_a_call_shows_the_mistakes_with_which_it_returns_something_else(monkeypa
     call = call_of(capped, 2.0, 3.0)
     shown = neighbours.Shown(call[0])
     every = set(shown.left)
-    x, first = shown.by(call, ([2.0, 3.0], {}), neighbours.HANG_S)
+    x, first = shown.by(([2.0, 3.0], {}), neighbours.HANG_S)
     assert x == dict(neighbours.values(call, "f", [neighbours.SAME], neighbours.HANG_S))[neighbours.SAME]
     assert first
     assert shown.left == every - set(first)
-    assert shown.by(call, ([2.0, 3.0], {}), neighbours.HANG_S) == (x, [])
-    _, second = shown.by(call, ([4.0, 3.0], {}), neighbours.HANG_S)
+    assert shown.by(([2.0, 3.0], {}), neighbours.HANG_S) == (x, [])
+    _, second = shown.by(([4.0, 3.0], {}), neighbours.HANG_S)
     assert second
     assert not set(first) & set(second)
 
@@ -223,7 +223,7 @@ def test_a_mistake_with_which_a_call_does_not_end_is_not_shown_by_it(monkeypatch
     call = call_of(twice_as_long, 2.0, 2.0)
     shown = neighbours.Shown(call[0])
     every = set(shown.left)
-    _, seen = shown.by(call, ([2.0, 2.0], {}), 0.2)
+    _, seen = shown.by(([2.0, 2.0], {}), 0.2)
     assert seen
     assert shown.left == every - set(seen)
     assert shown.left

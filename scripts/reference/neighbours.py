@@ -140,25 +140,25 @@ class Shown:
 
     def __init__(self, function: types.FunctionType) -> None:
         """None yet."""
+        self._function = function
         self._wrong = dict(enumerate(mistakes.of(function.__code__)))
         self.left = set(self._wrong)
 
-    def by(self, call: Call, changed: Arguments, limit_s: float = LIMIT_S) -> tuple[float, list[int]]:
-        """What a call returns with these arguments, and the mistakes with which it returns something else.
+    def by(self, arguments: Arguments, limit_s: float = LIMIT_S) -> tuple[float, list[int]]:
+        """What a call returns, and the mistakes with which it returns something else.
 
         Args:
-            call: A function and its arguments.
-            changed: The arguments in place of them.
+            arguments: Of the call.
             limit_s: Time for one call; raises TooLongError without a mistake.
         """
-        function = call[0]
-        x = returned(function, copy.deepcopy(changed), limit_s)
+        function = self._function
+        x = returned(function, copy.deepcopy(arguments), limit_s)
         shown = []
         for number in sorted(self.left):
             cells = function.__closure__ if self._wrong[number].co_freevars else None
             wrong = types.FunctionType(self._wrong[number], function.__globals__, function.__name__, None, cells)
             try:
-                other = returned(wrong, copy.deepcopy(changed), limit_s)
+                other = returned(wrong, copy.deepcopy(arguments), limit_s)
             except TooLongError:
                 continue
             if abs(other - x) > APART:

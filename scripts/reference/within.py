@@ -28,15 +28,13 @@ MODE = os.environ.get("MICRORAD_WITHIN", "")
 HOLDS = MODE == "hold"
 REFERENCE = Path(__file__).resolve().parents[2] / "reference" / "tests" if HOLDS else Path(MODE, "held")
 BY_CHANCE = (
-    *("core.folder:read_bytes.<locals>.at_once", "cli.frame:_progress_lines", "campaign.run:_minutes"),
-    *("core.integrity:", "core.threads:", "cli.installation:", "cli.__init__:doctor"),
-    *("studio.jobs.", "studio.views.latest:", "studio.views.runs:time_words", "studio.guard.names:within"),
-    *("campaign.engines.", "loop.pointing_loop.ensemble:_Advancing"),
-    *("campaign.rows.evaluate:_counts", "export.flight.build:", "export.flight.write:_cycles"),
+    *(*inside.BY_CHANCE, "cli.frame:_progress_lines", "cli.installation:", "cli.__init__:doctor"),
+    *("core.integrity:", "core.threads:", "studio.jobs.", "studio.views.latest:", "studio.views.runs:time_words"),
+    *("studio.guard.names:within", "campaign.rows.evaluate:_counts", "export.flight.write:_cycles"),
     "export.flight.stack:deepest.<locals>.below",
 )
-"""Functions whose values hang on the time, on threads or on the order of a set, are numbers of open files, change with
-each edit of the package, or name the place where Python is."""
+"""Those, and functions whose values hang on the order of a set, change with each edit of the package, or name the
+place where Python is."""
 
 CORES = os.cpu_count
 FORKED = get_context("fork")
@@ -66,9 +64,6 @@ TRIED_S = 1.0
 class Watching(inside.Watch):
     """Takes from a test what its functions return, and keeps calls to vary them when it has passed."""
 
-    limit_s = neighbours.HANG_S
-    """Processor time of one variation."""
-
     def __init__(self):
         """Nothing yet."""
         super().__init__()
@@ -89,17 +84,6 @@ class Watching(inside.Watch):
         finally:
             self._is_busy = False
 
-    def vary(self):
-        """What functions return for arguments near those that were kept."""
-        for name, call, x in self.varied():
-            self.values[name][call] = x
-
-    def varied(self):
-        """The same, one by one: a function and its mark, its call and variation, a value."""
-        for name, call, numbers, kept in self._kept:
-            for number, x in neighbours.values(kept, f"{name} {call}", numbers, self.limit_s):
-                yield f"{name}{neighbours.NEIGHBOURS}", f"{call}{number:02d}", x
-
 
 class Holding(Watching):
     """Takes from a test what was held of it."""
@@ -116,6 +100,12 @@ class Holding(Watching):
     def varies(self, name, call):
         """How the arguments of a call are varied: as it is held."""
         return self._varied[name].get(call) if name in self._varied else None
+
+    def vary(self):
+        """What functions return for arguments near those that were kept."""
+        for name, call, numbers, kept in self._kept:
+            for number, x in neighbours.values(kept, f"{name} {call}", numbers, neighbours.HANG_S):
+                self.values[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number:02d}"] = x
 
     def takes(self, name):
         """Which call of a function this is, and 0 where its value is not taken."""
@@ -235,7 +225,7 @@ class Taking(Watching):
             if tried.shown.left and tried.took_s < TRIED_S:
                 with suppress(Exception, TooLongError):  # arguments that refuse to be such, or that take too long
                     if (changed := neighbours.varied(kept, f"{name} {call}", number)) is not None:
-                        of = tried.shown.by(kept, changed, self.limit_s)
+                        of = tried.shown.by(changed, self.limit_s)
             tried.took_s += time.monotonic() - began
             theirs.send((*of, time.monotonic() - began))
 

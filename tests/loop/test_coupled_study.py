@@ -565,7 +565,7 @@ def test_the_margins_of_the_whole_are_told_as_those_of_one_loop():
 
 @pytest.mark.parametrize("apart", [0.0, 1e-14, 1e-9, 1e-4, 0.5, 0.999999])
 def test_least_singular_values_have_all_their_digits_where_both_are_alike(apart):
-    """Of U diag(1, 1 - apart) V^H times 0.6, with U and V drawn; and of a matrix of zeros."""
+    """Of U diag(1, 1 - apart) V^H times 0.6, with U and V drawn."""
     rng = np.random.default_rng(11)
     drawn = rng.standard_normal((2, 50, 2, 2)) + 1j * rng.standard_normal((2, 50, 2, 2))
     left, right = np.linalg.qr(drawn)[0]

@@ -335,7 +335,7 @@ def resolving(poles: Complexes, period_s: float) -> Floats:
         poles: Poles z of the loop, open and closed, shape (poles,).
         period_s: Control period, s.
     """
-    near = around_poles(np.unique(poles), period_s, 1.3) * (1.0 + 1e-9)  # an undamped filter has no response at its own
+    near = around_poles(poles, period_s, 1.3) * (1.0 + 1e-9)  # an undamped filter has no response at its own
     return np.unique(np.concatenate([np.geomspace(1e-7, 0.5, _POINTS) / period_s, near]).clip(max=0.5 / period_s))
 
 

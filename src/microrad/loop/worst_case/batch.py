@@ -130,7 +130,7 @@ class Margins:
         own = _stacked([loop.mirror.linear_loop])
         poles = np.concatenate([np.linalg.eigvals(self._plants(own).A).ravel(), np.linalg.eigvals(s.A)])
         parts = [np.geomspace(1e-5, 0.5, 160) / self._period, np.linspace(0.0, 0.5, 101)[1:] / self._period]
-        near = around_poles(np.unique(poles), self._period, AROUND) * (1.0 + 1e-9)  # an undamped one has no response
+        near = around_poles(poles, self._period, AROUND) * (1.0 + 1e-9)  # an undamped one has no response
         self._freq = np.unique(np.concatenate([*parts, near]))
         self._answers = self._response(self._freq)
 
