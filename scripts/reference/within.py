@@ -30,8 +30,8 @@ REFERENCE = Path(__file__).resolve().parents[2] / "reference" / "tests" if HOLDS
 BY_CHANCE = (
     *(*inside.BY_CHANCE, "cli.frame:_progress_lines", "cli.installation:", "cli.__init__:doctor"),
     *("core.integrity:", "core.threads:", "studio.jobs.", "studio.views.latest:", "studio.views.runs:time_words"),
-    *("studio.guard.names:within", "campaign.rows.evaluate:_counts", "export.flight.write:_cycles"),
-    "export.flight.stack:deepest.<locals>.below",
+    *("studio.guard.names:within", "campaign.rows.evaluate:_counts", "export.flight.stack:deepest.<locals>.below"),
+    *(f"export.flight.write:{name}" for name in ("_cycles", "_measured", "report_text", "export_flight")),
 )
 """Those, and functions whose values hang on the order of a set, change with each edit of the package, or name the
 place where Python is."""
