@@ -93,7 +93,7 @@ def check_quiet(page, base):
 
 
 def settled(page):
-    """Wait until nothing is grey (behind a change), every plot is drawn, and nothing changes for a quarter of a second."""
+    """Wait until nothing is grey (behind a change), all plots are drawn, and nothing changes for a quarter second."""
     page.wait_for_function("!document.querySelector('.behind')")
     page.wait_for_function("[...document.querySelectorAll('.js-plotly-plot')].every(e => e.querySelector('.main-svg'))")
     page.evaluate(_SETTLED)
