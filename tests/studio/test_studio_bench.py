@@ -16,6 +16,7 @@ from microrad.lab.live_fit import LIVE_FITS, LiveFit, Loop, live_fit_writer, thi
 from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.loop import controller_study
 from microrad.loop import paper_cases as tracking
+from microrad.loop.disturbance import Reference
 from microrad.loop.pointing_loop import linear
 from microrad.mission.file import load_mission
 from microrad.report.tables import Table
@@ -877,3 +878,450 @@ def test_what_cannot_be_asked_is_said(typed, words):
     with pytest.raises(control_view.AskError) as refusal:
         control_view.ask_of(*typed, 5000.0)
     assert words in str(refusal.value)
+
+
+# ------------------------------------------------------------------------------- several axes, drives and recordings
+def two_axes(begin_s=0.25):
+    """Three samples of two axes under three drives, no two numbers alike."""
+    return control_view.Curve(
+        begin_s + np.array([0.0, 1e-3, 4e-3]),
+        np.array([1e-6, 2e-6, 3e-6]),
+        np.array([4e-6, 5e-6, 7e-6]),
+        1e-6 * np.array([[11.0, 21.0], [12.0, 22.0], [13.0, 24.0]]),
+        np.array([[0.5, 1.5, 2.5], [0.6, 1.6, 2.6], [0.7, 1.7, 2.7]]),
+        1e-6 * np.array([[31.0, 41.0], [32.0, 42.0], [34.0, 43.0]]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("draw", "titled", "first", "traces"),
+    [
+        ("step", ("time (ms)", "line of sight, axis x (µrad)"), [0.0, 1.0, 4.0], [[1.0, 2.0, 3.0], [4.0, 5.0, 7.0]]),
+        ("sine", ("time (ms)", "error, axis x (µrad)"), [0.0, 1.0, 4.0], [[11.0, 12.0, 13.0]]),
+        ("jitter", ("time (s)", "error, axis x (µrad)"), [0.25, 0.251, 0.254], [[11.0, 12.0, 13.0]]),
+        ("motion", ("time (s)", "angle, axis x (µrad)"), [0.25, 0.251, 0.254], [[31.0, 32.0, 34.0], [4.0, 5.0, 7.0]]),
+    ],
+)
+def test_of_a_run_of_two_axes_the_first_is_drawn(draw, titled, first, traces):
+    answers = control_view.Answers(*({WITH: two_axes()},) * 3)
+    figure = getattr(control_view, f"{draw}_plot")(answers)
+    assert tuple(titles(figure)) == titled
+    assert [trace["x"] for trace in figure["data"]] == [first] * len(traces)
+    assert [trace["y"] for trace in figure["data"]] == [pytest.approx(each) for each in traces]
+
+
+def test_of_three_drives_the_first_is_drawn_between_unequal_limits():
+    of = made(limits_v=(-6.0, 7.0), identified_v=(-3.0, 4.0))
+    figure = control_view.drive_plot(of, {WITHOUT: two_axes()}, control_view.SECONDS)
+    (trace,) = figure["data"]
+    assert (trace["name"], trace["y"]) == (WITHOUT, [0.5, 0.6, 0.7])
+    assert trace["x"] == [0.25, 0.251, 0.254]
+    assert titles(figure) == ["time (s)", "drive from the bias (V)"]
+    assert straight(figure, "amplifier's limits") == [-6.0, 7.0]
+    assert straight(figure, "range of the identification") == [-3.0, 4.0]
+
+
+def test_the_variants_of_a_mirror_are_told_apart_by_colour_and_dash():
+    figure = control_view.sine_plot(control_view.Answers({}, {WITHOUT: curve(1e-6), WITH: curve(2e-6)}, {}))
+    drawn = {each["name"]: (each["line"]["color"].lower(), each["line"]["dash"]) for each in figure["data"]}
+    assert drawn[WITH][1] == "solid" and drawn[WITHOUT][1] != "solid"
+    assert drawn == {
+        WITH: (control_view.VERMILION.lower(), drawn[WITH][1]),
+        WITHOUT: (control_view.BLUE.lower(), drawn[WITHOUT][1]),
+    }
+
+
+def test_a_response_is_drawn_from_its_least_but_no_deeper_than_eighty_decibels():
+    deep = made(sensitivity=np.array([1e-7, 0.02, 3.0]), loop_gain=np.array([40.0, 0.5, 0.004]))
+    sensitivity, gain = control_view.sensitivity_plot(deep), control_view.gain_plot(deep)
+    ranges = [[figure["layout"][axis]["range"] for axis in ("xaxis", "yaxis")] for figure in (sensitivity, gain)]
+    assert ranges[0] == [[0, 2], pytest.approx([-4.0, math.log10(3.9)], rel=1e-4)]
+    assert ranges[1] == [[0, 2], pytest.approx([math.log10(0.004), math.log10(52.0)], rel=1e-4)]
+    assert (titles(sensitivity)[1], titles(gain)[1]) == ("|S|, error over disturbance", "|L|, loop gain")
+    named = [[s["name"] for s in figure["layout"]["shapes"] if s.get("name")] for figure in (sensitivity, gain)]
+    assert named == [["1 / modulus margin asked for (0.5)", "bandwidth 20 Hz"], ["crossover 30 Hz"]]
+    assert (straight(sensitivity, "asked for"), gain["data"][0]["y"]) == ([2.0], [40.0, 0.5, 0.004])
+
+
+def test_everything_that_has_to_be_known_of_a_controller_is_said_in_its_order():
+    of = made(name=PID_INVERSE, sensitivity=None, warnings=("one", "two"))
+    assert control_view.notes(of) == (
+        "The gains of [control] as they stand in the mission: this loop is not tuned, and nothing shakes it.",
+        "The optical sensor is slower than the control: the loop has no response by frequency of its own.",
+        "one",
+        "two",
+    )
+
+
+def test_the_errors_of_both_variants_are_told_in_one_sentence():
+    curves = {WITH: curve(3e-6), WITHOUT: replace(curve(0.0), error_rad=np.array([[3e-6, 0.0], [0.0, 5e-6]]))}
+    assert control_view.answer_words(curves, "Radial error", 4.5e-6) == (
+        "Radial error: with hysteresis 2.12 µrad rms, at most 3.00 µrad; without hysteresis 4.12 µrad rms, "
+        "at most 5.00 µrad."
+        " The sensor sees errors up to 4.5 µrad: beyond, it holds its last reading, and the loop does not act."
+    )
+
+
+def fits_of_two():
+    """Two models of two recordings, all numbers unlike."""
+    loops = [
+        Loop("a.csv", (0.0, 1.0), (1e-6, 2e-6), (3e-6, 4e-6), (0.5, 1.5), (5e-6, 6e-6), 0.75),
+        Loop("b.csv", (7.0, 8.0), (9e-6, 10e-6), (11e-6, 12e-6), (2.5, 3.5), (13e-6, -14e-6), 3.25),
+    ]
+    return LiveFit("one", 0.125, 0.25, tuple(loops)), LiveFit("two", 0.875, 0.75, tuple(reversed(loops)))
+
+
+def test_the_second_recording_of_a_model_is_drawn_with_its_own_samples():
+    first, second = fits_of_two()
+    loop, residual = mirror_view.loop_plot(first, 1, "mV"), mirror_view.residual_plot(first, 1)
+    assert [(t["name"], t["x"], t["y"]) for t in loop["data"]] == [
+        ("measured", [7.0, 8.0], [9.0, 10.0]),
+        ("one", [7.0, 8.0], [11.0, 12.0]),
+    ]
+    assert titles(loop) == ["drive (mV)", "angle (µrad)"]
+    (trace,) = residual["data"]
+    assert (trace["name"], trace["x"], trace["y"]) == ("measured less model", [2.5, 3.5], [13.0, -14.0])
+    (unseen,) = residual["layout"]["shapes"]
+    assert (unseen["name"], unseen["x0"], unseen["x1"]) == ("seen by no fit", 3.25, 3.5)
+    assert titles(residual) == ["time (s)", "residual (µrad)"]
+    assert mirror_view.loop_plot(second, 1, "V")["data"][1]["y"] == [3.0, 4.0]
+
+
+def test_scores_are_of_three_digits_held_out_before_fitted():
+    assert mirror_view.score_rows(fits_of_two()) == [
+        ("one", "0.25 %", "0.125 %", "best so far"),
+        ("two", "0.75 %", "0.875 %", ""),
+    ]
+    fits = [LiveFit("a", 0.12345, 12.3456, ()), LiveFit("b", 123.456, 0.0098765, ()), LiveFit("a", 1.0, 12.5, ())]
+    assert mirror_view.score_rows(fits, "a") == [
+        ("b", "0.00988 %", "123 %", ""),
+        ("a", "12.3 %", "0.123 %", ""),
+        ("a", "12.5 %", "1 %", "chosen"),
+    ]
+
+
+def test_the_first_channels_of_several_are_drawn_over_the_rows_that_are_shown():
+    view = View(900, 250.0, ("one", "two."), (10, 500, 899), ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)), ((7.0, 8.0, 9.0),) * 1)
+    loop, over_time = mirror_view.recording_plot(view, Setting()), mirror_view.time_plot(view, Setting())
+    assert (loop["data"][0]["x"], loop["data"][0]["y"]) == ([1.0, 2.0, 3.0], [7.0, 8.0, 9.0])
+    assert [(t["x"], t["y"]) for t in over_time["data"]] == [
+        ([0.04, 2.0, 3.596], [1.0, 2.0, 3.0]),
+        ([0.04, 2.0, 3.596], [7.0, 8.0, 9.0]),
+    ]
+    assert titles(loop) == ["drive (V)", "output (mrad)"]
+    assert mirror_view.about(view) == "900 samples at 250 Hz, 3.6 s."
+    assert mirror_view.findings(view) == ["One.", "Two."]
+
+
+def test_what_an_identification_warns_of_and_could_not_fit_is_told_line_by_line():
+    said = {"model": "m", "verdict": ["a", "b"], "warnings": ["c", "d"], "refused": {"e": "f", "g": "h"}}
+    model, (first, second, warned, refused) = mirror_view.outcome(json.dumps(said))
+    assert (model, first, second) == ("m", "a", "b")
+    assert warned.lines == ["Warning: c", "Warning: d"]
+    assert refused.lines == ["Not fitted: e: f", "Not fitted: g: h"]
+
+
+@pytest.mark.parametrize(
+    ("state", "progress", "cancelling", "lead", "words"),
+    [
+        ("queued", None, False, False, "Waiting for another job to end."),
+        (
+            "cancelled",
+            Progress(3, 14, "x"),
+            False,
+            True,
+            "Cancelled; nothing was written. Best so far: two, 0.75 % rms",
+        ),
+        ("lost", None, False, False, "lost: why"),
+        ("running", None, True, False, "Begins."),
+        ("running", Progress(2, 9, "play operators"), False, False, "2 of 9 fits: fitting prandtl_ishlinskii."),
+        ("running", Progress(4, 9, "linear part"), False, True, "4 of 9 fits: linear part. Best so far: two, 0.75 %"),
+    ],
+)
+def test_an_identification_says_how_far_it_is_and_what_leads(tmp_path, state, progress, cancelling, lead, words):
+    job = Job(1, tmp_path, state, "identification", progress=progress, cancelling=cancelling, words="why")
+    said = mirror_view.state_words(job, fits_of_two()[1] if lead else None)
+    assert said == (f"{words.partition(' rms')[0]} rms on samples that no fit has seen." if lead else words)
+
+
+def test_of_an_option_that_is_given_twice_the_last_value_counts(tmp_path):
+    words = (
+        "identify",
+        "--input",
+        "2",
+        "--name",
+        "--input-unit",
+        "--input-unit",
+        "mV",
+        "--rate",
+        "5.0",
+        "--rate",
+        "6.0",
+    )
+    job = Job(1, tmp_path, "done", arguments=words)
+    found = [mirror_view.argument(job, flag, "none") for flag in ("--input", "--input-unit", "--rate", "--output")]
+    assert found == ["2", "mV", "6.0", "none"]
+    assert mirror_view.argument(Job(1, tmp_path, "done"), "--rate", "none") == "none"
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "samples", "label"),
+    [
+        ("angle (urad)", "urad", 7, "3: angle (urad), 7 samples"),
+        ("urad", "urad", None, "3: urad (urad)"),
+        ("3", "mV", 12, "column 3 (mV), 12 samples"),
+        ("4", "", 12, "3: 4, 12 samples"),
+        ("", "", None, "column 3"),
+    ],
+)
+def test_a_channel_behind_the_first_is_called_by_its_number_name_and_unit(name, unit, samples, label):
+    others = (ChannelInfo("a", "", 1),) * 3
+    assert mirror_form.labels(Listing((*others, ChannelInfo(name, unit, samples)), None, ()))[3] == label
+
+
+def test_what_somebody_has_set_for_a_recording_is_kept_by_its_channels_and_the_oldest_goes():
+    form = mirror_form.shown(Form(), IN_MRAD, "a", "a.csv", alone=True)
+    about = mirror_form._about(IN_MRAD)
+    typed = replace(form.setting, drive=3, output=2, rate="7 kHz", drive_unit="mV", output_unit="mm", name="n")
+    found = mirror_form.edited(form, IN_MRAD, typed)
+    assert found.chosen == {
+        f"{about} drive": "3",
+        f"{about} output": "2",
+        f"{about} rate": "7 kHz",
+        f"{about} 3 drive_unit": "mV",
+        "drive_unit": "mV",
+        f"{about} 2 output_unit": "mm",
+        "output_unit": "mm",
+    }
+    assert (found.setting, found.seen) == (typed, "a")
+    full = replace(form, chosen={str(n): "x" for n in range(200)})
+    kept = mirror_form.edited(full, IN_MRAD, replace(form.setting, rate="8 Hz")).chosen
+    assert (len(kept), next(iter(kept)), kept[f"{about} rate"]) == (200, "1", "8 Hz")
+    back = mirror_form.shown(replace(found, seen="b"), IN_MRAD, "c", "c.csv")
+    assert (back.setting, back.seen) == (typed, "c")
+
+
+@pytest.mark.parametrize(
+    ("channels", "rates"),
+    [
+        ((("u", "V"), ("z", "mrad")), (5.0,)),
+        ((("u", "mV"), ("y", "mrad")), (5.0,)),
+        ((("u", "V"), ("y", "mrad")), (6.0,)),
+    ],
+)
+def test_files_differ_by_names_units_and_rates_of_their_channels(channels, rates):
+    plain = listed(("u", "V"), ("y", "mrad"), rates=(5.0,))
+    assert mirror_form._about(plain) == mirror_form._about(listed(("u", "V"), ("y", "mrad"), time=0, rates=(5.0,)))
+    assert mirror_form._about(listed(*channels, rates=rates)) != mirror_form._about(plain)
+
+
+def test_a_displacement_by_its_lever_arm_is_the_arm_in_metres():
+    for unit, arm, found in (("um", "37.5 mm", 0.0375), ("mm", " 0.25 m ", 0.25), ("m", "4 um", 4e-6)):
+        assert mirror_form.lever_arm_m(Setting(output_unit=unit, lever_arm=arm)) == pytest.approx(found, rel=1e-12)
+    for unit in ("mrad", "urad", "rad"):
+        assert mirror_form.lever_arm_m(Setting(output_unit=unit, lever_arm="37.5 mm")) is None
+
+
+def test_a_unit_that_a_second_recording_denies_names_that_recording(tmp_path):
+    odd = listed(("drive [mV]", ""), ("angle [mrad]", ""))
+    recordings = [
+        Dropped("a", "a.csv", tmp_path / "a.csv", "fit", IN_MRAD),
+        Dropped("b", "b.csv", tmp_path / "b.csv", "check", odd),
+    ]
+    with pytest.raises(SettingError) as refusal:
+        mirror_form.identification(tmp_path, recordings, Setting(0, 1))
+    assert str(refusal.value) == (
+        "unit of the drive: the form says V and b.csv says mV; choose what the file says, or set its use to leave out"
+    )
+
+
+def test_several_recordings_are_fitted_and_checked_in_their_order(tmp_path):
+    uses = {"d": "check", "a": "fit", "c": "leave", "b": "fit", "e": "check"}
+    recordings = [Dropped(name, name, tmp_path / "up" / name, use) for name, use in uses.items()]
+    setting = Setting(3, 2, "1.25 kHz", "mV", "urad", "", ("clipping", "drift"), False, True, "  stage y ")
+    action = mirror_form.identification(tmp_path, recordings, setting)
+    assert action.arguments == (
+        *("identify", "up/a", "up/b", "--input", "3", "--output", "2", "--rate", "1250.0"),
+        *("--accept", "clipping", "--accept", "drift", "--validate", "up/d", "--validate", "up/e"),
+        *("--input-unit", "mV", "--output-unit", "urad", "--name", "stage y", "--mirror-file", "stage y.toml"),
+        "--admissible",
+    )
+    assert (action.title, action.results) == ("identify stage y", ("stage y.toml", "stage y.html"))
+
+
+# ---------------------------------------------------------------------------------------- what a loop is made to answer
+@pytest.fixture
+def spans(monkeypatch):
+    """What loops are asked for, in place of simulating them: the loop, the span, and from when it is shown."""
+    asked = []
+
+    def noted(loop, of, span, from_s):
+        asked.append((loop, of, span, from_s))
+        return len(asked)
+
+    monkeypatch.setattr(control_model, "_curve", noted)
+    monkeypatch.setattr(control_model.parts, "without", lambda loop, *those: replace(loop))
+    return asked
+
+
+@pytest.mark.parametrize(("bandwidth_hz", "samples"), [(400.0, 300), (5000.0, 60), (30.0, 2400), (0.0, 2400)])
+def test_a_step_is_shown_for_six_periods_of_the_bandwidth(mission, spans, bandwidth_hz, samples):
+    """Within sixty samples and six times 400 periods of the control."""
+    scene = scene_of(mission)
+    loop = replace(scene.loop, timing=replace(scene.loop.timing, period_s=5e-5))
+    control_model._step(loop, "of", control_view.Ask(2e-6, 3e-6, 7.0, 11), bandwidth_hz)
+    ((stepped, of, span, from_s),) = spans
+    assert stepped.references[0] == Reference(2e-6, 0.0, 1.0)
+    assert stepped.references[1:] == loop.references[1:]
+    assert (of, span.seed, span.settle_s, from_s) == ("of", 11, 0.0, 0.0)
+    assert span.duration_s == pytest.approx(samples * 5e-5, rel=1e-9)
+
+
+@pytest.mark.parametrize(("freq_hz", "settle_s"), [(0.5, 2.0), (2.5, 0.4), (40.0, 0.4)])
+def test_two_periods_of_a_sine_are_shown_behind_one_period_or_what_settles(mission, spans, freq_hz, settle_s):
+    loop = scene_of(mission).loop
+    control_model._sine(loop, "of", control_view.Ask(2e-6, 3e-6, freq_hz, 12))
+    ((sine, of, span, from_s),) = spans
+    assert sine.references[0] == replace(loop.references[0], sine_amplitude_rad=3e-6, sine_freq_hz=freq_hz)
+    assert sine.references[1:] == loop.references[1:]
+    assert (of, span.seed, span.settle_s, from_s) == ("of", 12, settle_s, settle_s)
+    assert span.duration_s == pytest.approx(settle_s + 2.0 / freq_hz, rel=1e-12)
+
+
+def test_each_variant_answers_with_its_own_loop_and_the_jitter_of_the_mission(mission, spans, monkeypatch):
+    scene = scene_of(mission)
+    table = scene.table.model_copy(update={"duration_s": 3.5, "settle_s": 1.25})
+    straight = replace(scene.loop, drive_range_v=(-1.0, 2.0))
+    monkeypatch.setattr(control_model, "with_mirror", lambda loop, mirrors, variant: straight)
+    monkeypatch.setattr(control_model, "for_mirror", lambda of, loop: (of, loop.drive_range_v))
+    asked = control_view.Ask(2e-6, 3e-6, 8.0, 13)
+    answers = control_model._fine_answers(replace(scene, table=table), "PI", 50.0, asked, (WITHOUT, WITH))
+    assert (answers.step, answers.sine, answers.jitter) == (
+        {WITHOUT: 1, WITH: 2},
+        {WITHOUT: 3, WITH: 4},
+        {WITHOUT: 5, WITH: 6},
+    )
+    assert [each[1] for each in spans] == [("PI", (-1.0, 2.0)), ("PI", scene.loop.drive_range_v)] * 3
+    assert [each[0].drive_range_v for each in spans] == [(-1.0, 2.0), scene.loop.drive_range_v] * 3
+    for loop, _, span, from_s in spans[4:]:
+        assert loop in (straight, scene.loop)
+        assert (span.duration_s, span.settle_s, span.seed, from_s) == (3.5, 1.25, 13, 1.25)
+
+
+def test_a_run_is_shown_from_where_it_has_settled_with_what_it_had_to_follow(monkeypatch):
+    """The angle that is found is what was wanted, and what disturbs, less the error; of the first of two axes."""
+    time_s = np.array([0.1, 0.2, 0.3, 0.4])
+    run = SimpleNamespace(
+        time_s=time_s,
+        reference_rad=np.array([[1.0, 21.0], [2.0, 22.0], [4.0, 24.0], [8.0, 28.0]]),
+        error_rad=np.array([[0.5, 30.5], [0.25, 30.25], [0.125, 30.125], [0.375, 31.0]]),
+        disturbance_rad=np.array([[10.0, 50.0], [20.0, 60.0], [40.0, 70.0], [80.0, 90.0]]),
+        drive_v=np.array([[3.0, 4.0], [5.0, 6.0], [7.0, 8.0], [9.0, 10.0]]),
+    )
+    monkeypatch.setattr(control_model.traces, "trace", lambda *asked: run)
+    found = control_model._curve("loop", "of", "span", 0.1 + 0.2)  # a hair above 0.3
+    assert found.time_s.tolist() == [0.3, 0.4]
+    assert found.wanted_rad.tolist() == [4.0, 8.0]
+    assert found.found_rad.tolist() == [4.0 + 40.0 - 0.125, 8.0 + 80.0 - 0.375]
+    assert found.error_rad.tolist() == [[0.125, 30.125], [0.375, 31.0]]
+    assert found.drive_v.tolist() == [[7.0, 8.0], [9.0, 10.0]]
+    assert found.disturbance_rad.tolist() == [[44.0, 94.0], [88.0, 118.0]]
+
+
+def test_a_tracked_sine_is_shown_in_its_steady_part_alone():
+    three = np.arange(8.0).reshape(4, 2)
+    run = SimpleNamespace(
+        steady=slice(1, 3),
+        time_s=np.array([0.0, 0.1, 0.2, 0.3]),
+        reference_rad=three,
+        output_rad=10.0 + three**2,
+        error_rad=100.0 + three,
+        drive_v=200.0 + three,
+    )
+    found = control_model._tracked(run)
+    assert (found.time_s.tolist(), found.wanted_rad.tolist()) == ([0.1, 0.2], [2.0, 4.0])
+    assert (found.found_rad.tolist(), found.disturbance_rad) == ([14.0, 26.0], None)
+    assert found.error_rad.tolist() == [[102.0, 103.0], [104.0, 105.0]]
+    assert found.drive_v.tolist() == [[202.0, 203.0], [204.0, 205.0]]
+
+
+@pytest.mark.parametrize("name", [PID, PID_INVERSE])
+def test_the_loop_of_control_follows_a_step_and_the_end_of_a_sine(monkeypatch, name):
+    asked = []
+    monkeypatch.setattr(control_model.simulate, "track", lambda *given: asked.append(given) or given)
+    monkeypatch.setattr(control_model, "_tracked", lambda given: given[1])
+    monkeypatch.setattr(control_model.control, "inverse", lambda plant: ("inverse", plant))
+    monkeypatch.setattr(control_model.control, "no_feedforward", lambda plant: ("none", plant))
+    setup = SimpleNamespace(timing=SimpleNamespace(period_s=1e-3))
+    plants = {WITH: "given", WITHOUT: "straight"}
+    answers = control_model._pid_answers(name, plants, setup, 20.0, control_view.Ask(2e-6, 3e-6, 8.0), (WITH, WITHOUT))
+    assert answers.step == answers.sine == plants
+    assert answers.jitter == {}
+    kind = "inverse" if name == PID_INVERSE else "none"
+    assert [each[:4] for each in asked] == [(name, p, setup, (kind, p)) for p in plants.values()] * 2
+    step, sine = asked[1][4:], asked[3][4:]
+    assert (step[0].shape, np.unique(step[0]).tolist(), step[1]) == ((300, 1), [2e-6], slice(0, 300))
+    assert np.max(sine[0]) == pytest.approx(3e-6, rel=1e-3)
+    assert (sine[1].stop, sine[1].stop - sine[1].start) == (sine[0].shape[0], 250)
+
+
+def test_the_least_and_the_longest_step_of_the_loop_of_control(monkeypatch):
+    asked = []
+    monkeypatch.setattr(control_model.simulate, "track", lambda *given: asked.append(given[4].shape[0]))
+    monkeypatch.setattr(control_model, "_tracked", lambda given: given)
+    monkeypatch.setattr(control_model.control, "no_feedforward", lambda plant: None)
+    setup = SimpleNamespace(timing=SimpleNamespace(period_s=1e-2))
+    for crossover_hz in (0.25, 2.5, 40.0):
+        ask = control_view.Ask(2e-6, 3e-6, 8.0)
+        control_model._pid_answers(PID, {WITH: "given"}, setup, crossover_hz, ask, (WITH,))
+    assert asked[::2] == [600, 240, 60]
+
+
+def test_a_tuned_controller_has_everything_of_its_scene(monkeypatch):
+    tuned = SimpleNamespace(
+        controller="tuned",
+        margins=SimpleNamespace(bandwidth_hz=123.0),
+        values={"a": 2.5, "b": 31.25},
+        residual_rms_rad=4e-7,
+        bound_by=("one", "two"),
+    )
+    asked = {}
+    for name, made in (("plants", ["plant", "other"]), ("tune", tuned), ("build", "built")):
+        monkeypatch.setattr(controller_study, name, lambda *given, n=name, m=made: asked.update({n: given}) or m)
+    units = [SimpleNamespace(name="a", unit="Hz"), SimpleNamespace(name="b", unit="")]
+    other, mine = (SimpleNamespace(name=n, parameters=lambda plant, u=u: u) for n, u in (("PI", []), ("mine", units)))
+    monkeypatch.setattr(control_model, "families", lambda table: [other, mine])
+    monkeypatch.setattr(control_model, "_responses", lambda loop, of, freq: (freq + 1.0, freq + 2.0))
+    loop = SimpleNamespace(
+        timing=SimpleNamespace(period_s=2e-4),
+        drive=SimpleNamespace(minimum_v=-6.0, maximum_v=7.0),
+        drive_range_v=(-3.0, 4.0),
+        optical=SimpleNamespace(field_of_view_rad=1.5e-3),
+    )
+    scene = SimpleNamespace(table=SimpleNamespace(seed=9, modulus_margin=0.45), loop=loop)
+    found = control_model._fine(scene, "mine")
+    assert asked == {
+        "plants": (scene, 9),
+        "tune": ("mine", scene.table, ["plant", "other"]),
+        "build": ("mine", scene, "tuned"),
+    }
+    assert (found.name, found.margins, found.tuned) == ("mine", tuned.margins, "a 2.5 Hz, b 31.2")
+    assert (found.residual_rad, found.bound_by, found.asked_modulus) == (4e-7, ("one", "two"), 0.45)
+    assert (found.field_of_view_rad, found.rate_hz) == (1.5e-3, pytest.approx(5000.0))
+    assert (found.freq_hz.size, found.freq_hz[[0, -1]].tolist()) == (500, pytest.approx([0.25, 2497.5]))
+    assert (found.loop_gain[0], found.sensitivity[0]) == (pytest.approx(1.25), pytest.approx(2.25))
+    assert found.ask.args == (scene, "built", 123.0)
+
+
+def test_the_loop_of_control_is_shown_with_its_own_limits_and_rate(mission):
+    found = control_model.controller(mission, PID)
+    cases = cases_of(mission.mission)
+    assert found.limits_v == (cases.setup.drive.minimum_v, cases.setup.drive.maximum_v)
+    assert found.identified_v == cases.mirrors.drive_range_v
+    assert found.rate_hz == pytest.approx(1.0 / cases.setup.timing.period_s)
+    assert found.freq_hz[[0, -1]] == pytest.approx([0.5e-5 * found.rate_hz, 0.4995 * found.rate_hz])
+    assert (found.tuned, found.bound_by) == ("the gains of [control]", ())
+    assert math.isnan(found.residual_rad) and math.isnan(found.asked_modulus)
+    at = np.interp(found.margins.crossover_hz, found.freq_hz, found.loop_gain)
+    assert at == pytest.approx(1.0, rel=1e-2)
+    assert np.max(found.sensitivity) == pytest.approx(1.0 / found.margins.modulus, rel=1e-2)
