@@ -239,3 +239,108 @@ def test_only_what_writes_has_results():
     assert commands.study(MISSION, Path("o")).results == ("o/report.html", "o/results.nc", "o/manifest.json")
     run, resumed = commands.campaign(Path("c.toml"), Path("c.ledger")), commands.resume(Path("c.ledger"))
     assert run.results == resumed.results == ("c.ledger",)
+
+
+@pytest.mark.parametrize(
+    ("action", "arguments", "title", "results"),
+    [
+        (
+            commands.study(Path("a b.toml"), Path("-out")),
+            ("run", "a b.toml", "--output", "./-out"),
+            "Study of a b.toml",
+            ("-out/report.html", "-out/results.nc", "-out/manifest.json"),
+        ),
+        (
+            commands.campaign(Path("-c.toml"), Path("-t.ledger")),
+            ("campaign", "run", "./-c.toml", "--ledger", "./-t.ledger"),
+            "Campaign -c.toml",
+            ("-t.ledger",),
+        ),
+        (
+            commands.resume(Path("-t.ledger")),
+            ("campaign", "resume", "./-t.ledger"),
+            "Campaign -t.ledger, going on",
+            ("-t.ledger",),
+        ),
+        (
+            commands.campaign_report(Path("t.ledger"), Path("p.html")),
+            ("campaign", "report", "t.ledger", "p.html", "--overwrite"),
+            "Report of t.ledger",
+            ("p.html",),
+        ),
+    ],
+)
+def test_what_is_run_has_its_arguments_its_title_and_its_results(action, arguments, title, results):
+    assert (action.arguments, action.title, action.results) == (arguments, title, results)
+
+
+def test_the_report_of_a_ledger_is_written_by_the_lines_of_python(folder, monkeypatch):
+    from microrad.campaign.statistics import summary
+    from microrad.report.campaign import page
+
+    monkeypatch.setattr(summary, "summarise_campaign", lambda ledger: ("summary of", ledger))
+    monkeypatch.setattr(page, "campaign_page", lambda found: f"{found[0]} {found[1]}, µ")
+    assert executed(commands.campaign_report(Path("it's.ledger"), Path('"p".html')).python) == ""
+    assert Path('"p".html').read_text("utf-8") == "summary of it's.ledger, µ"
+    assert not Path("it's.ledger").exists()
+
+
+def test_a_campaign_goes_on_from_its_own_ledger_in_python(monkeypatch):
+    from microrad.campaign import run
+    from microrad.campaign.statistics import summary
+    from microrad.report.campaign import text
+
+    done = []
+    monkeypatch.setattr(run, "run_campaign", lambda *given: done.append(given))
+    monkeypatch.setattr(run, "resume_campaign", lambda *given: done.append(given))
+    monkeypatch.setattr(summary, "summarise_campaign", lambda ledger: ledger)
+    monkeypatch.setattr(text, "campaign_text", lambda found, width: f"{found} in {width} columns")
+    assert executed(commands.campaign(Path("c.toml"), Path("one.ledger")).python) == "one.ledger in 80 columns\n"
+    assert executed(commands.resume(Path("two.ledger")).python) == "two.ledger in 80 columns\n"
+    assert done == [(Path("c.toml"), Path("one.ledger"), run.Means()), (Path("two.ledger"), run.Means())]
+
+
+def test_an_identification_of_several_files_is_called_alike_in_both(monkeypatch, folder):
+    from microrad.lab import identify, recording
+
+    action = commands.identify(
+        (Path("a.csv"), Path("-b.csv")),
+        "3",
+        "2",
+        Path("up/m.toml"),
+        name="n",
+        units=("mV", "um"),
+        rate_hz=1250.5,
+        accept=("clipping", "drift"),
+        validate=(Path("c.csv"), Path("-d.csv")),
+        lever_arm_m=0.0375,
+        admissible=True,
+    )
+    assert action.command == (
+        "microrad identify a.csv ./-b.csv --input 3 --output 2 --rate 1250.5 --accept clipping --accept drift "
+        "--validate c.csv --validate ./-d.csv --input-unit mV --output-unit um --lever-arm '0.0375 m' --name n "
+        "--mirror-file up/m.toml --admissible"
+    )
+    assert (action.title, action.results) == ("identify n", ("up/m.toml", "up/m.html"))
+    asked = []
+    monkeypatch.setattr(microrad, "read_recording", lambda *given, **more: given + tuple(more.items()), raising=False)
+    monkeypatch.setattr(recording, "read_in", lambda found, drive, output: (*found, drive, output))
+
+    def stopped(*given, **more):
+        asked.append((given, more))
+        raise SystemExit("enough")
+
+    monkeypatch.setattr(identify, "identify", stopped)
+    with pytest.raises(SystemExit, match="enough"):
+        executed(action.python)
+    ((recordings,), how) = asked[0]
+    rest = "3", "2", 1250.5, ("accept", ("clipping", "drift")), "mV", "um"
+    assert recordings == [("a.csv", *rest), ("-b.csv", *rest)]
+    assert how == {
+        "models": identify.MODELS,
+        "validation": [("c.csv", *rest), ("-d.csv", *rest)],
+        "lever_arm_m": 0.0375,
+        "admissible": True,
+        "input_unit": "mV",
+        "output_unit": "um",
+    }

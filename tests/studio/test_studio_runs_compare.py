@@ -697,3 +697,209 @@ def test_a_study_tells_only_requirements_that_have_both_numbers(tmp_path):
         ]
     rows = [row, row | {"name": "a", "actual": None, "met": False}]
     assert not compare_view._found(tmp_path / "manifest.json", {"requirements": rows, "verdict": ""}).met
+
+
+# ----------------------------------------------------------------------------------------- beside the first of a kind
+def test_a_beam_that_misses_zero_decibels_is_told_with_its_own_numbers(draft, monkeypatch):
+    study = study_of(2.5)
+    study.budgets[1].margin_db = -0.25
+    monkeypatch.setattr(compare_view.link_study, "run_link_study", lambda file: study)
+    found = [(n.name, n.value, n.unit, n.required, n.met) for n in compare_view.link_numbers(draft)]
+    assert found == [
+        ("Communication: margin", 2.5, "dB", "3.00 dB", False),
+        ("Communication: received power", 1e-9, "W", "", None),
+        ("Beacon: margin", -0.25, "dB", "0.00 dB", False),
+        ("Beacon: received power", 1e-12, "W", "", None),
+        ("Data rate", 3e8, "bit/s", "", None),
+        ("Largest data rate with the required margin", 4e8, "bit/s", "", None),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.98765432, "", "0.9877"),
+        (622.08e6, "bit/s", "622 Mbit/s"),
+        (3.14159e-4, "rad", "314 µrad"),
+        (12345.678, "", "1.235e+04"),
+    ],
+)
+def test_a_number_is_shown_with_its_unit_in_few_digits(value, unit, text):
+    assert Number("n", value, unit).text == text
+
+
+def test_the_change_of_a_number_has_its_unit_and_a_sign_in_front():
+    here, there = (
+        [Number("r", 622.08e6, "bit/s"), Number("p", 0.25, "")],
+        [Number("p", 0.125, ""), Number("r", 1e9, "bit/s")],
+    )
+    assert compare_view.beside(here, there) == [
+        ("r", "622 Mbit/s", "1 Gbit/s", "+378 Mbit/s"),
+        ("p", "0.25", "0.125", "-0.125"),
+    ]
+
+
+def test_a_study_says_its_numbers_with_what_was_required_of_each(tmp_path):
+    rows = [
+        {"name": "rate", "actual": 622.08e6, "required": "300e6", "unit": "bit/s", "met": 1},
+        {"name": "error", "actual": 4.5e-6, "required": 1e-5, "unit": "rad", "met": 0},
+    ]
+    found = compare_view._found(tmp_path / "out" / "manifest.json", {"requirements": rows, "verdict": "no"})
+    assert (found.folder, found.verdict, found.met) == ("out", "no", False)
+    assert [(n.text, n.required, n.met) for n in found.numbers] == [
+        ("622 Mbit/s", "300 Mbit/s", True),
+        ("4.5 µrad", "10 µrad", False),
+    ]
+
+
+def test_two_missions_without_a_budget_both_say_why(session, draft):
+    here, there = draft.set("terminals.leo_aperture", "5 parsec"), draft.set("terminals.geo_aperture", "6 V")
+    links, verdicts, differ = compare_view.blocks(session, here, there, ("a.toml", "b.toml"))
+    said = [each.headline for each in links.blocks]
+    assert [each.partition("\n")[0] for each in said] == [f"{n} has no link budget:" for n in ("a.toml", "b.toml")]
+    assert "parsec" in said[0] and "geo_aperture" in said[1] and "parsec" not in said[1]
+    assert [row[0] for row in differ.blocks[1].rows] == ["terminals.leo_aperture", "terminals.geo_aperture"]
+    assert len(verdicts.blocks) == 2
+    assert [view.title for view in (links, verdicts, differ)] == ["Links", "Verdicts", "Differences"]
+
+
+def test_the_studies_of_two_missions_stand_beside_each_other_by_their_names(session, draft):
+    there = draft.set("terminals.leo_aperture", "6 cm")
+    rate = {"name": "rate", "unit": "bit/s", "required": 2e8, "actual": 3e8, "met": True}
+    less = {"name": "margin", "unit": "dB", "required": 3.0, "actual": 2.5, "met": False}
+    finished(session, draft, "first")
+    finished(session, there, "second", verdict="it does not", requirements=[rate, less])
+    verdicts = compare_view.blocks(session, draft, there, ("a.toml", "b.toml"))[1]
+    ours, theirs, table = verdicts.blocks
+    assert (ours.headline, ours.good) == ("a.toml: it closes (first)", True)
+    assert (theirs.headline, theirs.good) == ("b.toml: it does not (second)", False)
+    assert table.rows == [
+        ("margin", Cell("4.00 dB, required 3.00 dB", "PASS"), Cell("2.50 dB, required 3.00 dB", "FAIL"), "−1.50 dB"),
+        ("rate", "none", Cell("300 Mbit/s, required 200 Mbit/s", "PASS"), ""),
+    ]
+
+
+@pytest.mark.parametrize(("prefix", "table"), [("beacon", "beacons"), ("channel", "channel_of_mine")])
+def test_a_table_whose_name_begins_another_one_is_counted_by_its_own_keys(draft, prefix, table):
+    ours, theirs = f"[{prefix}]\nx = 1\ny = 2\n", f"[{table}]\nx = 1\ny = 2\nz = 3\n"
+    here, there = draft.with_text(ours), draft.with_text(theirs)
+    assert compare_view.differences(here, there) == [
+        (f"[{prefix}]", "2 keys", "not given"),
+        (f"[{table}]", "not given", "3 keys"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "same"),
+    [
+        ("[1, 2, 3]", "[1, 3, 2]", False),
+        ("true", "true", True),
+        ("[true]", "[false]", False),
+        ("0.1", "0.10", True),
+        ("1_000", "1000", True),
+        ("-0.5", "0.5", False),
+    ],
+)
+def test_values_that_mean_the_same_are_no_difference(draft, here, there, same):
+    ours, theirs = (draft.with_text(f"[odd]\nx = {each}\n") for each in (here, there))
+    assert (compare_view.differences(ours, theirs) == []) == same
+
+
+def test_a_list_of_quantities_differs_by_its_second_or_by_its_length(draft):
+    plain = draft.set("scenario.pid_frequencies", "1 Hz, 15 Hz")
+    for typed, same in (
+        ("1 Hz, 0.015 kHz", True),
+        ("1 Hz, 15.0001 Hz", False),
+        ("1 Hz", False),
+        ("15 Hz, 1 Hz", False),
+    ):
+        assert (compare_view.differences(plain, draft.set("scenario.pid_frequencies", typed)) == []) == same
+
+
+def test_a_free_name_is_the_third_where_a_file_and_a_job_have_two(session, monkeypatch):
+    (session.folder / "x.html").touch()
+    jobs = [
+        Job(1, session.folder, "done", results=("x-4.html",)),
+        Job(2, session.folder, "running", results=("other.html", "x-2.html")),
+        Job(3, session.folder, "queued", results=("x-3/report.html", "x-5.html")),
+    ]
+    monkeypatch.setattr(session.jobs, "listed", lambda: tuple(jobs))
+    assert runs_view.free_name(session, "x", ".html") == "x-3.html"
+    assert runs_view.free_name(session, "x-3") == "x-3-2"
+    assert runs_view.free_name(session, "other", ".html") == "other-2.html"
+    assert runs_view.free_name(session, "y") == "y"
+
+
+def test_a_second_example_of_a_campaign_gets_a_name_of_its_own_and_a_quoted_mission(session):
+    (session.folder / "campaign.toml").write_text("mine", "utf-8")
+    odd = session.folder / 'my "µ" mission.toml'
+    session.save(odd.name)
+    path = runs_view.write_campaign(session)
+    assert path == session.folder / "campaign-2.toml"
+    assert tomllib.loads(path.read_text("utf-8"))["mission"] == odd.name
+    assert "µ" in path.read_text("utf-8")
+    assert (session.folder / "campaign.toml").read_text("utf-8") == "mine"
+    assert runs_view.campaign_files(session) == ("campaign-2.toml",)
+
+
+def test_a_campaign_of_a_mission_that_is_not_saved_is_refused_by_its_name(tmp_path):
+    fresh = Session(tmp_path)
+    with pytest.raises(JobError) as refusal:
+        runs_view.write_campaign(fresh)
+    assert str(refusal.value) == ("leo-geo.toml is not saved yet, and a campaign reads it from its file; save it")
+    assert runs_view.campaign_files(fresh) == ()
+
+
+def test_the_report_of_a_ledger_goes_beside_a_page_that_is_there(session):
+    (session.folder / "tails.v2.html").touch()
+    order = runs_view.report_order(session, Path("tails.v2.ledger"))
+    assert (order.kind, order.title, order.cwd) == ("export", "Report of tails.v2.ledger", session.folder)
+    assert order.arguments == ("campaign", "report", "tails.v2.ledger", "tails.v2-2.html", "--overwrite")
+    assert order.results == ("tails.v2-2.html",)
+
+
+@pytest.mark.parametrize(
+    ("progress", "words"),
+    [
+        (Progress(37, 1600, "rows", 12.5), "2.3 %, 37 of 1600 rows; 12.5 a second, 2.08 min left"),
+        (Progress(90, 120, "tuning LQG", 0.00625), "75 %, 90 of 120: tuning LQG; 0.00625 a second, 80 min left"),
+        (Progress(1600, 1600, "rows", 234.7), "100 %, 1600 of 1600 rows; 235 a second, 0 s left"),
+        (Progress(7, 0, "links"), "0 %, 7 of 0: links"),
+    ],
+)
+def test_progress_has_its_share_its_pace_and_what_is_left(progress, words):
+    assert runs_view.progress_words(progress) == words
+
+
+@pytest.mark.parametrize(
+    ("kind", "code", "state", "words"),
+    [
+        ("campaign", 0, "done", "done: the rows keep the limits"),
+        ("identification", 0, "done", "done"),
+        ("study", 2, "failed", "failed"),
+        ("study", None, "done", "done"),
+        ("campaign", 1, "cancelled", "cancelled"),
+        ("study", 0, "unreadable", "unreadable"),
+    ],
+)
+def test_only_a_job_that_is_done_has_a_verdict(tmp_path, kind, code, state, words):
+    assert runs_view.state_words(Job(1, tmp_path, state, kind, code=code, cancelling=True)) == words
+
+
+def test_results_keep_their_places_among_those_that_are_gone(session):
+    for name in ("b.nc", "d.json"):
+        (session.folder / name).touch()
+    (session.folder / "c.html").mkdir()
+    job = Job(5, session.folder, "done", cwd=session.folder, results=("a.html", "b.nc", "c.html", "d.json"))
+    assert runs_view.result_files(session, job) == ((1, "b.nc"), (3, "d.json"))
+    assert runs_view.result_files(session, replace(job, state="lost")) == ((1, "b.nc"), (3, "d.json"))
+
+
+def test_the_report_of_another_kind_of_job_is_none_of_a_campaign(tmp_path):
+    done = campaign(tmp_path, 1, ledger="-x.ledger")
+    (tmp_path / "x.html").touch()
+    written = report(tmp_path, 2, ledger="-x.ledger")
+    assert runs_view.others((written, done), done) == runs_view.Others(True, True, written)
+    verify = replace(written, arguments=("campaign", "verify", "./-x.ledger"))
+    assert runs_view.others((verify, done), done).report is None
+    assert runs_view.others((replace(written, number=1), done), done).report is None
