@@ -835,3 +835,266 @@ def test_nothing_of_this_needs_a_browser():
     texts = [path.read_text("utf-8") for path in folder.glob("*.py")]
     assert len(texts) > 10
     assert not any("nicegui" in text for text in texts)
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+UNLIKE = {
+    "communication.data_rate": "622.08 Mbit/s",
+    "communication.pointing_error": "7.3 urad",
+    "requirement.pointing_error": "4.1 urad",
+    "requirement.margin": "1.7 dB",
+}
+
+
+def unlike(draft, **more):
+    """The mission with numbers that have digits, in place of those that are alike."""
+    for key, typed in (UNLIKE | more).items():
+        draft = draft.set(key, typed)
+    return draft
+
+
+def test_the_axes_of_a_map_reach_a_decade_about_the_rate_and_three_times_the_larger_error(draft):
+    found = link_view.view(unlike(draft).link())
+    frame = found.frame
+    assert frame.data_rate_bit_s[[0, -1]] == pytest.approx([1e7, 1e10], rel=1e-9)
+    assert frame.pointing_error_rad[[0, -1]] == pytest.approx([0.0, 21.9e-6], rel=1e-9)
+    assert (frame.data_rate_bit_s.size, frame.pointing_error_rad.size, found.margin_db.shape) == (65, 61, (65, 61))
+    strict = unlike(draft, **{"requirement.pointing_error": "9.2 urad", "communication.data_rate": "1.5 Gbit/s"})
+    other = link_view.view(strict.link()).frame
+    assert other.data_rate_bit_s[[0, -1]] == pytest.approx([1e8, 1e11], rel=1e-9)
+    assert other.pointing_error_rad[-1] == pytest.approx(27.6e-6, rel=1e-9)
+
+
+def test_the_map_has_the_working_point_both_contours_and_the_margins_of_each_place(draft):
+    found = link_view.view(unlike(draft).link())
+    figure = link_view.map_plot(found)
+    heat, *drawn = figure["data"]
+    by_name = {each["name"]: each for each in drawn}
+    assert [*by_name] == ["0 dB", "1.7 dB", "working point"]
+    assert [by_name[name]["line"]["dash"] for name in ("0 dB", "1.7 dB")] == ["dash", "solid"]
+    assert by_name["0 dB"]["line"]["width"] < by_name["1.7 dB"]["line"]["width"]
+    assert (by_name["working point"]["x"], by_name["working point"]["y"]) == ([622.08], [7.3])
+    x_axis, y_axis = figure["layout"]["xaxis"], figure["layout"]["yaxis"]
+    assert (x_axis["range"], y_axis["range"]) == ([1, 4], pytest.approx([0.0, 21.9]))
+    assert (heat["zmin"], heat["zmax"]) == (-12, 18)
+    assert len(heat["z"]) == 61 and len(heat["z"][0]) == 65
+    assert heat["z"][60][3] == pytest.approx(found.margin_db[3, 60], abs=0.006)
+    level = np.interp(7.3, by_name["1.7 dB"]["y"], by_name["1.7 dB"]["x"])
+    at = np.interp(7.3e-6, found.frame.pointing_error_rad, found.contours[1.7])
+    assert level == pytest.approx(at * 1e-6, rel=1e-3)
+
+
+def test_a_mission_whose_required_margin_is_zero_has_one_contour(draft):
+    found = link_view.view(draft.set("requirement.margin", "0 dB").link())
+    assert [*found.contours] == [0.0]
+    names = [each["name"] for each in link_view.map_plot(found)["data"] if each.get("name")]
+    assert names == ["0 dB", "working point"]
+
+
+def test_the_map_in_words_has_the_rate_with_its_digits_and_both_ways_out(draft):
+    found = link_view.view(unlike(draft).link())
+    words = link_view.map_words(found)
+    fastest = link_study.largest_rate(found.data)
+    error = link.largest_pointing_error(found.data, 1.7, 622.08e6)
+    assert words == (
+        "At 622.1 Mbit/s and 7.3 µrad the communication link has "
+        f"{link_view.signed(found.budgets[0].margin_db, 'dB')}. At most {link_view.quantity(fastest, 'bit/s')} at "
+        f"4.1 µrad, or {link_view.quantity(error, 'rad')} at 622.1 Mbit/s, for the required 1.7 dB."
+    )
+
+
+def test_a_margin_below_zero_is_missed_by_its_sign_and_needs_its_digits():
+    margin = link_view.Margin("a", -0.125, -0.25)
+    assert (margin.met, margin.words, margin.needs) == (True, "\u22120.12 dB", "needs -0.25 dB: met")
+    assert link_view.Margin("a", 1.69, 1.7, True, "†").words == "+1.69 dB †"
+    assert link_view.Margin("a", 1.69, 1.7).needs == "needs 1.7 dB: MISSED"
+
+
+@pytest.mark.parametrize(
+    ("key", "seldom"),
+    [
+        ("terminals.leo_obscuration", True),
+        ("beacon.wavefront_error", True),
+        ("requirement.outage", True),
+        ("answer.strehl", True),
+        ("beacon.strehl_of_mine", False),
+        ("communication.loss", False),
+        ("communication.pointing_error", False),
+    ],
+)
+def test_what_is_seldom_moved_ends_like_it(key, seldom):
+    assert link_view.second(key) is seldom
+
+
+def test_the_bars_of_the_lines_have_their_rows_their_class_and_the_totals_below(draft):
+    found = pointing_view.view(draft.link())
+    figure = pointing_view.lines_plot(found)
+    rows = [(each.name, each.kind, each.error_rad) for each in found.budget.stated]
+    totals = [(each.name, "total", each.total_rad) for each in found.budget.summations]
+    bars = {each["name"]: each for each in figure["data"]}
+    assert [*bars] == [*dict.fromkeys(kind for _, kind, _ in (*rows, *totals))]
+    for kind, bar in bars.items():
+        own = [(k, 1e6 * error) for k, (_, of, error) in enumerate((*rows, *totals)) if of == kind]
+        assert bar["y"] == [k for k, _ in own]
+        assert bar["x"] == pytest.approx([error for _, error in own], rel=1e-4)
+        assert set(bar["base"]) == {0}
+    assert figure["layout"]["yaxis"]["ticktext"] == [name for name, *_ in (*rows, *totals)]
+    (rule,) = [shape for shape in figure["layout"]["shapes"] if shape.get("name")]
+    assert (rule["name"], rule["x0"]) == ("beacon's half angle: 390 µrad", 390)
+
+
+@pytest.mark.parametrize(
+    ("key", "group"),
+    [
+        ("pointing.lines.body_pointing.error", "Errors"),
+        ("pointing.lines.body_pointing.kind", ""),
+        ("pointing.lines_of_mine.a.error", ""),
+        ("error_budget.sources.a-b.size", "Sources"),
+        ("error_budget.sources.a-b.rate", "Sources"),
+        ("error_budget.sources.a-b.limit", ""),
+        ("error_budget.requirements.a.limit", "Limits"),
+        ("error_budget.requirements.a.size", ""),
+        ("beacon.divergence", "Beacon"),
+        ("answer.divergence", ""),
+        ("point_ahead.error", "Point-ahead"),
+        ("pointing.confidence", "Asked for"),
+    ],
+)
+def test_what_moves_the_budget_stands_in_its_group(key, group):
+    assert pointing_view._group(key) == group
+
+
+@pytest.mark.parametrize(
+    ("key", "label"),
+    [
+        ("pointing.lines.star_tracker_x.error", "Star tracker x"),
+        ("error_budget.sources.thermo-elastic_drift.rate", "Thermo elastic drift"),
+        ("error_budget.requirements.code_word.limit", "Code word"),
+    ],
+)
+def test_a_slider_of_the_budget_is_called_by_its_line(key, label):
+    made = sliders.Slider(key, "Error", "1 urad", LENGTH)
+    assert pointing_view._named(made) == replace(made, label=label)
+
+
+def test_two_faults_of_a_key_are_told_beside_its_slider_and_those_of_its_neighbour_are_not(draft):
+    one, two = (SimpleNamespace(key="a.b", reason=f"reason {n}", expected=f"wanted {n}") for n in (1, 2))
+    other = SimpleNamespace(key="a.bc", reason="reason 3", expected="wanted 3")
+    wrong = SimpleNamespace(problems=(one, other, two))
+    assert sliders.faulty(wrong, ["x.y", "a.bc", "a.b"]) == {
+        "a.bc": "reason 3; expected wanted 3",
+        "a.b": "reason 1; expected wanted 1; reason 2; expected wanted 2",
+    }
+
+
+@pytest.mark.parametrize(
+    ("typed", "position", "text"),
+    [("2.5 cm", 0, "0.5 cm"), ("2.5 cm", 60, "1.06 cm"), ("2.5 cm", 200, "6.07 cm"), ("2.5 cm", 239, "9.88 cm")],
+)
+def test_a_position_between_the_ends_is_a_value_of_three_digits(typed, position, text):
+    made = ranged(LENGTH, typed, "cm", 2.5)
+    assert (made.low, made.high) == (0.5, 10.0)
+    wanted = 0.5 * 20.0 ** (position / 240.0)
+    assert text == f"{float(f'{wanted:.3g}'):g} cm"
+    assert made.at(position) == text
+
+
+def test_a_slider_that_held_no_quantity_begins_anew_about_the_next_one():
+    broken = ranged(LENGTH, "5 cm", "cm", 5.0).holding("five")
+    again = broken.holding("250 mm")
+    assert (broken.scale, again.scale, again.unit, again.value) == ("none", "logarithmic", "mm", 250.0)
+    assert (again.low, again.high) == pytest.approx((50.0, 1000.0))
+    level = ranged(POWER, "-80 dBm", "dBm", -80.0).holding("2 nW")
+    assert (level.scale, level.unit, level.low, level.high) == ("logarithmic", "nW", 0.5, 10.0)
+    assert level.holding("-57 dBm").low == -67.0
+
+
+def test_the_groups_of_sliders_stand_in_the_order_that_is_asked_for(draft):
+    text = "[b]\nx = 1\n[terminals]\nleo_aperture = '5 cm'\ngeo_aperture = '7 cm'\n[beacon]\nstrehl = 0.5\n"
+    found = sliders.grouped(
+        draft.with_text(text),
+        ("Second", "Empty", "First"),
+        lambda key: {"terminals": "First", "beacon": "Second"}.get(key.partition(".")[0], ""),
+    )
+    assert {name: [each.key for each in those] for name, those in found.items()} == {
+        "Second": ["beacon.strehl"],
+        "First": ["terminals.leo_aperture", "terminals.geo_aperture"],
+    }
+    assert [*found] == ["Second", "First"]
+
+
+def test_figures_within_a_verdict_within_a_view_are_drawn_by_their_names(figures):
+    from microrad.report.view import Drawing, Verdict
+
+    timeline, volume = figures["day-timeline"], figures["data-volume"]
+    still = replace(volume, alive=False)
+    blocks = [View("v", [Verdict("h", [timeline, Drawing("sketch", "t", "c", "<svg>µ</svg>")])]), "text", still]
+    found = plots.drawn(blocks)
+    assert [*found] == ["day-timeline", "sketch", "data-volume"]
+    assert found["day-timeline"]["data"] and found["data-volume"] == plots.address(volume.svg)
+    assert base64.b64decode(found["sketch"].partition(",")[2]).decode() == "<svg>µ</svg>"
+
+
+def test_panels_side_by_side_stand_apart_and_keep_the_height_of_the_sheet():
+    at = np.array([0.0, 1.0])
+    plain = plots.plot(Axis("x"), Axis("y"), Line(at, at))
+    named = plots.plot(Axis("x"), Axis("y"), Line(at, at, label="a"))
+    tall = plots.plot(Axis("x"), Axis("y"), Line(at, at, label="a"), height=5.0)
+    assert named["layout"]["height"] - named["rows"] == plain["layout"]["height"] - plain["rows"] + 30
+    assert tall["rows"] - named["rows"] == pytest.approx(1.4 * 96, abs=1)
+    layout = named["layout"]
+    margin = layout["margin"]
+    assert layout["height"] == pytest.approx(named["rows"] + margin["t"] + margin["b"] + 30, abs=1)
+    assert (layout["xaxis"]["domain"], layout["yaxis"]["domain"]) == ([0.0, 1.0], [0.0, 1.0])
+
+
+def test_rows_stand_from_the_top_with_a_name_at_each():
+    axis = plots.rows(["a", "b", "c"])
+    assert (axis.low, axis.high, axis.ticks, axis.grid) == (2.6, -0.6, {0: "a", 1: "b", 2: "c"}, False)
+
+
+@pytest.mark.parametrize(
+    ("lacking", "words"),
+    [
+        (("orbit",), "The mission has no [orbit], so it has no day; microrad init writes such tables."),
+        (("operations",), "The mission has no [operations], so it has no day; microrad init writes such tables."),
+        (("orbit", "operations"), "The mission has no [orbit] and no [operations], so it has no day; microrad"),
+    ],
+)
+def test_a_table_that_a_day_lacks_is_named(lacking, words):
+    tables = {name: None if name in lacking else object() for name in ("orbit", "operations")}
+    said = day_view.missing(SimpleNamespace(mission=SimpleNamespace(**tables)))
+    assert said == words or (len(lacking) == 2 and said.startswith(words))
+
+
+def test_a_day_says_what_it_is_at_before_it_has_steps(monkeypatch):
+    said = []
+    monkeypatch.setattr(day_view.link_study, "run_link_study", lambda file: said.append(file) or "links")
+    monkeypatch.setattr(
+        day_view.day_study, "run_day_study", lambda links, on_progress: on_progress(3, 7, "passes") or (links, "day")
+    )
+    assert day_view.compute_day("file", lambda *told: said.append(told)) == ("links", "day")
+    assert said == [(0, 0, "links"), "file", (0, 0, "contacts"), (3, 7, "passes")]
+
+
+def test_a_cancelled_question_is_dropped_while_its_progress_is_told():
+    latest, begun, go = Latest(), threading.Event(), threading.Event()
+    done = []
+
+    def work(progress):
+        progress(2, 5, "half")
+        begun.set()
+        go.wait(HANG_S)
+        progress(3, 5, "more")
+        done.append("not dropped")
+
+    latest.ask("a", work)
+    assert begun.wait(HANG_S)
+    state = latest.state
+    assert (state.key, state.running, state.done, state.total, state.what) == ("a", True, 2, 5, "half")
+    assert (state.result, state.error) == (None, "")
+    thread = latest._thread
+    latest.cancel()
+    go.set()
+    thread.join(HANG_S)
+    assert (done, latest.state) == ([], type(state)())
