@@ -624,3 +624,192 @@ def test_stations_that_are_offered_make_a_mission_without_faults(tmp_path, name)
         assert added.set(availability, typed).problems == ()
     (fault,) = added.set(availability, "1.5").problems
     assert fault.key == availability and "a list of 12 such" in fault.expected
+
+
+# ------------------------------------------------------------------------------------------- behind the first of a kind
+def test_a_line_goes_behind_the_last_key_of_its_own_table_and_not_of_one_that_begins_alike(draft):
+    text = "[beacon_of_mine]\nx = 1\n\n[beacon]\nstrehl = 0.5\nfoo = [\n  1,\n]\n# behind\n\n[beacon.inner]\ny = 2\n"
+    got = draft.with_text(text).set("beacon.wavelength", "977 nm")
+    assert got.text == text.replace("]\n# behind", ']\nwavelength = "977 nm"\n# behind')
+    at_top = draft.with_text("# head\n\n[beacon]\nstrehl = 0.5\n").set("name", "n")
+    assert at_top.text == 'name = "n"\n# head\n\n[beacon]\nstrehl = 0.5\n'
+    empty = draft.with_text("[beacon]\n[answer]\n").set("answer.strehl", "0.25")
+    assert empty.text == "[beacon]\n[answer]\nstrehl = 0.25\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "rest"),
+    [
+        ("a = 1\nb = [\n  1,\n  2,\n] # two\nc = 3\n", "b", "a = 1\nc = 3\n"),
+        ("a = 1 # one\nb = 2\n", "a", "b = 2\n"),
+        ("[x]\na = 1\n[y]\na = 2", "y.a", "[x]\na = 1\n[y]\n"),
+        ("\ufeffa = 1\r\nb = 2\r\nc = 3\r\n", "b", "\ufeffa = 1\r\nc = 3\r\n"),
+        ("\ufeffa = 1\r\nb = 2\nc = 3\r\n", "c", "\ufeffa = 1\r\nb = 2\n"),
+    ],
+)
+def test_a_key_goes_with_all_of_its_own_lines_and_no_other(tmp_path, text, key, rest):
+    assert Draft(text, tmp_path / "m.toml", ()).without(key).text == rest
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "typed", "new"),
+    [
+        ("\ufeffa = 1\r\nb = 22\r\nc = 3\r\n", "b", "4", "\ufeffa = 1\r\nb = 4\r\nc = 3\r\n"),
+        ("a = 1\r\nb = 22\nc = 3\r\n", "c", "[5]", "a = 1\r\nb = 22\nc = [5]\r\n"),
+        ("\ufeffa = 1\nb = 'µ' # ü\nc = 3", "c", "true", "\ufeffa = 1\nb = 'µ' # ü\nc = true"),
+        ("a = 1\r\n[t]\r\nb = 2\r\n", "t.b", "x", 'a = 1\r\n[t]\r\nb = "x"\r\n'),
+    ],
+)
+def test_a_value_behind_other_lines_is_replaced_in_its_place(tmp_path, text, key, typed, new):
+    assert Draft(text, tmp_path / "m.toml", ()).set(key, typed).text == new
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("nowhere", "nowhere has no line of its own in {path}; change it in the text"),
+        ("terminals", "terminals has no line of its own in {path}; change it in the text"),
+    ],
+)
+def test_a_key_without_a_line_cannot_go(draft, key, words):
+    with pytest.raises(DraftError) as refusal:
+        draft.without(key)
+    assert str(refusal.value) == words.format(path=draft.path)
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("requirement.none", "requirement.none is no key of [requirement], which has margin, "),
+        ("none.at.all", "none.at.all is no key of the mission"),
+        ("channel.model", "channel.model "),
+    ],
+)
+def test_a_key_that_cannot_be_set_says_where_it_would_belong(draft, key, words):
+    with pytest.raises(DraftError) as refusal:
+        draft.set(key, "1")
+    assert str(refusal.value).startswith(words)
+
+
+def test_a_key_of_a_table_that_is_missing_names_the_table_and_the_file(draft):
+    bare = draft.with_text("name = 'a'\n")
+    with pytest.raises(DraftError) as refusal:
+        bare.set("beacon.strehl", "0.5")
+    assert str(refusal.value) == (
+        f"beacon.strehl needs the table [beacon], which has no header in {draft.path}; change the text"
+    )
+
+
+def test_half_a_character_is_named_by_its_place(draft):
+    with pytest.raises(DraftError, match=r"^abc\\?.*holds half of a character at 4; type it again$"):
+        draft.set("name", "abc\udc80d")
+
+
+def test_every_fault_of_a_key_is_beside_its_value_and_no_other_one(draft):
+    wrong = draft.set(APERTURE, "8").set("terminals.geo_aperture", "9 V").set("acquisition.attempts", "2.5")
+    lines = {fault.key: fault.line for fault in wrong.problems}
+    assert {*lines} == {APERTURE, "terminals.geo_aperture", "acquisition.attempts"}
+    told = {key: [fault.key for fault in value.problems] for key, value in wrong.values.items() if value.problems}
+    assert told == {key: [key] for key in lines}
+    assert {key: wrong.values[key].line for key in lines} == lines
+    assert wrong.report.count("line ") >= 3 and str(wrong.path) in wrong.report
+
+
+@pytest.mark.parametrize(
+    ("typed", "raw"),
+    [
+        ("1, 0.2, -3e-4", "[1, 0.2, -3e-4]"),
+        ("[1,  2 ]", "[1,  2 ]"),
+        ("", "[]"),
+        ("[", "[]"),
+        ("1, a b, 2", '[1, "a b", 2]'),
+        ("true, 2", "[true, 2]"),
+    ],
+)
+def test_a_list_of_plain_numbers_keeps_what_stands_alone(typed, raw):
+    assert key_of("fine_pointing.geometry.coupling").toml(typed) == raw
+
+
+@pytest.mark.parametrize(
+    ("dotted", "kind", "required"),
+    [
+        ("terminals.leo_aperture", "quantity", True),
+        ("beacon.strehl", "number", False),
+        ("acquisition.attempts", "whole number", None),
+        ("orbit.leo.limits.in_eclipse", "switch", None),
+        ("conventions.strehl", "choice", None),
+        ("pointing.lines.any_name_at_all.error", "quantity", True),
+        ("operations.stations.somewhere.availability", None, None),
+    ],
+)
+def test_a_key_of_a_table_with_a_name_of_its_own_is_found_like_any_other(dotted, kind, required):
+    found = key_of(dotted)
+    assert found is None if kind is None else found.kind == kind
+    if required is not None:
+        assert (found.key, found.required) == (dotted, required)
+
+
+def test_a_table_of_names_is_no_table_of_keys():
+    assert keys_in("pointing.lines") == ()
+    assert {key.key for key in keys_in("pointing.lines.mine")} >= {"pointing.lines.mine.error"}
+    assert key_of("pointing.lines") is None and key_of("pointing.lines.mine") is None
+    assert key_of("terminals.leo_aperture.more") is None
+    assert all("." not in key.key for key in keys_in(""))
+
+
+def test_examples_come_with_their_inner_tables_and_in_the_order_of_their_depth():
+    names = [*tables._examples()]
+    assert [name.count(".") for name in names] == sorted(name.count(".") for name in names)
+    blocks = {"a": "[a]\nx = 1", "ab": "[ab]", "a.b": "[a.b]", "a.b.c": "[a.b.c]", "b": "[b]"}
+    assert tables._whole("a", blocks) == "[a]\nx = 1\n\n[a.b]\n\n[a.b.c]"
+    assert tables._whole("a.b", blocks) == "[a.b]"
+    named = {"o": "[o]", "o.stations.x": "[o.stations.x]", "o.other": "[o.other]", "o.stations.y": "[o.stations.y]"}
+    assert tables._with_named("o", named) == "[o]\n\n[o.stations.x]\n\n[o.stations.y]"
+
+
+def test_a_block_of_a_text_has_the_comment_right_above_its_header():
+    text = (
+        "# head\n\n# of a, one\n# of a, two\n[a]\nx = 1\ny = [\n  2,\n]\n# between\n"
+        "# z = 3\n[b]\n\n# far\n\n# [d]\n# of c\n[c]\nz = 1\n# " + 30 * "-" + " rule\n[e]"
+    )
+    assert dict(tables._blocks(text)) == {
+        "a": "# of a, one\n# of a, two\n[a]\nx = 1\ny = [\n  2,\n]",
+        "b": "[b]",
+        "c": "# of c\n[c]\nz = 1",
+        "e": "[e]",
+    }
+
+
+@pytest.mark.parametrize(
+    ("place", "written"),
+    [
+        ("sub/s.toml", "../sub/s.toml"),
+        ("mission/s.toml", "s.toml"),
+        ('mission/a "b".toml', 'a "b".toml'),
+        ("mission/µ/s.toml", "µ/s.toml"),
+    ],
+)
+def test_the_mirror_of_another_folder_is_named_as_seen_from_the_mission(tmp_path, place, written):
+    draft = Draft("[mirror]\nname = 'a'\n[mirror.linear]\nx = 1\n[b]\n", tmp_path / "mission" / "m.toml", ())
+    got = tables.with_mirror_file(draft, tmp_path / place).text
+    assert tomllib.loads(got) == {"mirror": {"file": written}, "b": {}}
+    assert (got.endswith("\n[b]\n") and "µ" in got) or "µ" not in place
+
+
+def test_another_name_for_a_file_in_the_same_place_is_its_own(draft, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    new = draft.set(APERTURE, "8 cm").save("m.toml")
+    assert (new.path, new.disk_sha256, new.changed) == (Path("m.toml"), new.sha256, False)
+    assert 'leo_aperture = "8 cm"' in (tmp_path / "m.toml").read_text("utf-8")
+    assert (draft.disk_sha256, draft.on_disk()) == (draft.sha256, "changed")
+
+
+def test_a_file_that_cannot_be_read_is_not_written_over(draft, monkeypatch):
+    def refuse(path, most):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(drafts, "read_bytes", refuse)
+    with pytest.raises(DraftError) as refusal:
+        draft.set(APERTURE, "8 cm").save()
+    assert str(refusal.value) == f"{draft.path} cannot be written: Permission denied; choose another name"
+    assert draft.on_disk() == "changed"
