@@ -1008,3 +1008,165 @@ def test_a_link_on_another_page_opens_the_studio(studio, tab, name):
         tab.locator("#in").click()
         tab.get_by_text("<img src=x").wait_for()
         assert tab.url == f"http://127.0.0.1:{studio}/plain"
+
+
+# ------------------------------------------------------------------------------------------- several headers and limits
+def page_of(reply):
+    """Title and words of a page of the guard itself."""
+    words = unescape(re.search(r"<p>(.*?)</p>", reply.body)[1])
+    return unescape(re.search(r"<h1>(.*?)</h1>", reply.body)[1]), words
+
+
+@pytest.mark.parametrize(
+    ("how", "status", "title", "words"),
+    [
+        ({"host": ["a", "b"]}, 400, "bad request", "A request names exactly one host and at most one page that it"),
+        ({"origin": [PAGE, PAGE]}, 400, "bad request", "A request names exactly one host and at most one page that"),
+        (
+            {"host": "a:1"},
+            421,
+            "misdirected request",
+            f"'a:1' is not this server. Open {PAGE} instead; a tunnel has this",
+        ),
+        ({"origin": "http://b"}, 403, "forbidden", "A page of 'http://b' may not use the studio."),
+        ({"method": "PUT", "origin": None}, 403, "forbidden", "A request that acts says by its Origin which page it"),
+        ({"sec_fetch_site": "cross-site"}, 403, "forbidden", "A page of another site may not use the studio."),
+        ({"path": "/a\tb"}, 400, "bad request", "The address holds characters that do not print."),
+        ({"content_length": "7 "}, 400, "bad request", "The length of the request is not one number."),
+    ],
+)
+def test_each_refusal_has_its_own_title_and_words_and_ends_the_connection(how, status, title, words):
+    inner = Inner()
+    reply = ask(guard(inner), **how)
+    assert (reply.status, inner.scopes, reply.headers[b"connection"]) == (status, [], b"close")
+    assert page_of(reply)[0].startswith(f"Refused: {title}")
+    assert page_of(reply)[1].startswith(words)
+    assert "<a href" not in reply.body
+
+
+@pytest.mark.parametrize(
+    ("query", "cookie", "words"),
+    [
+        ("token=x", COOKIE, "The token in the address is not that of this session. Open the address that the command"),
+        ("", None, "This browser has not shown the token of this session. Open the address that the command microrad"),
+    ],
+)
+def test_a_locked_studio_says_why_and_offers_the_way_back(query, cookie, words):
+    reply = ask(guard(Inner()), query=query, cookie=cookie)
+    title, said = page_of(reply)
+    assert (reply.status, title) == (403, "The studio is locked")
+    assert said.startswith(words) and said.endswith("stop the command with Ctrl-C and start it again.")
+    assert '<a href="/">Then go on here.</a>' in reply.body
+    assert b"connection" not in reply.headers
+
+
+@pytest.mark.parametrize(
+    ("upload_bytes", "path", "words"),
+    [
+        (200_000_000, UPLOAD, "at most 200.1 MB in one request"),
+        (2_500_000, UPLOAD, "at most 2.566 MB in one request"),
+        (2_500_000, "/", "at most 1 MB in one request"),
+    ],
+)
+def test_what_is_too_large_is_told_with_the_limit_of_its_path(upload_bytes, path, words):
+    limits = Limits(upload_bytes=upload_bytes)
+    most = limits.of(path)
+    over, just = (
+        ask(guard(Inner(), limits=limits), "POST", path=path, content_length=str(n)) for n in (most + 1, most)
+    )
+    assert (over.status, just.status) == (413, 200)
+    title, said = page_of(over)
+    assert title == "The file is too large"
+    assert said.startswith(f"The studio takes {words}. Cut out the part of the recording that you need, keep every")
+
+
+def test_a_cookie_of_this_port_is_found_among_those_of_others_and_behind_an_old_one():
+    other = f"microrad_studio_{PORT + 1}={TOKEN}"
+    old = f"microrad_studio_{PORT}=old"
+    for cookie, status in (
+        (f"a=b; {other}; {COOKIE}", 200),
+        (f"{old};{COOKIE}", 200),
+        ([old, f"  {COOKIE} ; c"], 200),
+        ([other, old], 403),
+        (f"x{COOKIE}", 403),
+        (f"{COOKIE}=", 403),
+    ):
+        assert ask(guard(Inner()), cookie=cookie).status == status, cookie
+
+
+def test_an_answer_has_the_headers_of_the_application_but_for_those_of_the_policy():
+    given = [(b"Content-Security-Policy", b"x"), (b"X-Own", b"1"), (b"REFERRER-policy", b"all"), (b"X-Own", b"2")]
+    found = policy.secured(given, "rules")
+    assert found == [
+        (b"X-Own", b"1"),
+        (b"X-Own", b"2"),
+        (b"content-security-policy", b"rules"),
+        (b"x-content-type-options", b"nosniff"),
+        (b"referrer-policy", b"no-referrer"),
+        (b"cross-origin-opener-policy", b"same-origin"),
+        (b"cross-origin-resource-policy", b"same-origin"),
+    ]
+
+
+def test_a_page_of_a_second_name_may_connect_to_that_name_alone():
+    reply = ask(guard(Inner()), host=f"LOCALHOST:{PORT}", origin=f"http://localhost:{PORT}")
+    rules = directives(reply)
+    assert rules["connect-src"] == f"'self' ws://localhost:{PORT}"
+    assert rules["img-src"] == "'self' data: blob:"
+    assert (rules["frame-ancestors"], rules["base-uri"], rules["form-action"]) == ("'none'",) * 3
+    assert rules["frame-src"] == rules["font-src"] == "'self'"
+
+
+def test_documents_are_framed_by_the_studio_and_load_nothing():
+    rules = directives(ask(guard(Inner(), documents=("/a/", "/results/")), path="/results/7/1"))
+    assert rules == {
+        "sandbox": "allow-scripts allow-downloads allow-modals",
+        "default-src": "'none'",
+        "script-src": "'unsafe-inline'",
+        "style-src": "'unsafe-inline'",
+        "img-src": "data: blob:",
+        "font-src": "data:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+        "frame-ancestors": "'self'",
+    }
+
+
+@pytest.mark.parametrize(
+    ("headers", "body", "closes"),
+    [
+        ({}, [b""], False),
+        ({"content_length": "0"}, [b""], False),
+        ({"content_length": "3"}, [b"abc"], True),
+        ({"transfer_encoding": "chunked"}, [b"abc"], True),
+        ({"transfer_encoding": "chunked", "content_length": "0"}, [b"abc"], True),
+    ],
+)
+def test_an_answer_before_a_body_closes_the_connection_where_there_is_one(headers, body, closes):
+    reply = ask(guard(Inner(read=False)), "POST", body=body, **headers)
+    assert (reply.status, reply.headers.get(b"connection") == b"close") == (200, closes)
+    assert ask(guard(Inner()), "POST", body=body, **headers).headers.get(b"connection") is None
+
+
+@pytest.mark.parametrize("site", ["same-site", "cross-site"])
+def test_a_link_with_more_in_its_query_enters_by_a_page(site):
+    link = {"sec_fetch_site": site, "sec_fetch_mode": "navigate", "sec_fetch_dest": "document"}
+    reply = ask(guard(Inner()), path="/a b", query=f"x=1&token={TOKEN}&y=", cookie=None, **link)
+    assert (reply.status, reply.headers[b"refresh"]) == (200, b"0;url=/a%20b?x=1&y=")
+    assert page_of(reply) == ("Opening the studio", "One moment.")
+    assert int(reply.headers[b"content-length"]) == len(reply.body.encode())
+    assert reply.headers[b"content-type"] == b"text/html; charset=utf-8"
+
+
+def test_several_names_that_are_none_are_all_told():
+    with pytest.raises(address.ExposureError) as refusal:
+        address.hosts(81, ("good", "a/b", "[::1]", "c d"))
+    assert str(refusal.value) == (
+        "'a/b, c d' is no name of a host; give names such as 127.0.0.1, without http:// or port"
+    )
+    with pytest.raises(address.ExposureError) as refusal:
+        address.hosts(81, ("a/" * 90,))
+    assert str(refusal.value).startswith(f"'{'a/' * 60}' is no name")
+    assert address.hosts(8080, ("h" * 253,)) == (f"{'h' * 253}:8080",)
+    assert address.cookie_name("[::1]:8123") == "microrad_studio_8123"
+    assert address.cookie_name("[::1]") == address.cookie_name("80.example") == "microrad_studio_80"
