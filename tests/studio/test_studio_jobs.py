@@ -840,3 +840,197 @@ def test_a_lock_is_gone_with_its_process(tmp_path):
 
 def test_the_module_that_runs_a_job_is_named_as_it_is():
     assert jobs_process.__name__ == jobs_process._OWN
+
+
+# ------------------------------------------------------------------------------------------------ what a job is told by
+def test_a_job_is_told_by_all_that_its_folder_says(tmp_path):
+    told = {"kind": "campaign", "title": "t", "arguments": ["a", 1], "results": ["x", "y"], "queued": "then"}
+    folder = written(tmp_path / "jobs", 12, cwd="/somewhere", **told)
+    (folder / "started.json").write_text('{"at": "begun", "pid": 3}', "utf-8")
+    (folder / "exit.json").write_text('{"at": "over", "code": 2}', "utf-8")
+    (folder / "progress").write_text('{"at": 1, "done": 3, "total": 7, "what": "w"}\n', "utf-8")
+    (folder / "stderr").write_text("microrad: odd\n", "utf-8")
+    assert jobs_files.read_job(folder) == jobs_files.Job(
+        number=12,
+        folder=folder,
+        state="failed",
+        kind="campaign",
+        title="t",
+        arguments=("a", "1"),
+        cwd=Path("/somewhere"),
+        results=("x", "y"),
+        queued="then",
+        started="begun",
+        ended="over",
+        code=2,
+        progress=jobs_files.Progress(3, 7, "w"),
+        words="odd",
+    )
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: (folder / "job.json").unlink(), "No such file or directory"),
+        (
+            lambda folder: (folder / "job.code").write_text("0", "utf-8"),
+            "it was not queued by you with this installation of microrad, so it is not started",
+        ),
+        (
+            lambda folder: (folder / "job.code").unlink(),
+            "it was not queued by you with this installation of microrad, so it is not started",
+        ),
+        (lambda folder: (folder / "job.json").write_bytes(bytes(16_000_001)), "it is larger than 16000000 bytes"),
+    ],
+)
+def test_a_job_that_cannot_be_read_says_why_and_what_to_do(tmp_path, spoil, words):
+    folder = written(tmp_path / "jobs", 31, cwd=str(tmp_path))
+    spoil(folder)
+    job = jobs_files.read_job(folder)
+    assert (job.number, job.state, job.title, job.finished) == (31, "unreadable", "(unreadable)", True)
+    assert job.words == (
+        f"{folder / 'job.json'} is not taken: {words}; remove this job, its results are where they were"
+    )
+
+
+@pytest.mark.parametrize(
+    ("state", "begun", "words"),
+    [
+        (
+            "lost",
+            False,
+            "its folder was moved or copied before it was started, so it is not started here; start it anew",
+        ),
+        (
+            "lost",
+            True,
+            "its process is gone without an exit code: the machine went down, it was killed, or the disk is",
+        ),
+        ("running", True, ""),
+        ("queued", False, ""),
+        ("unreadable", False, ""),
+    ],
+)
+def test_a_job_without_an_end_says_what_became_of_it(tmp_path, state, begun, words):
+    if begun:
+        (tmp_path / "started.json").touch()
+    (tmp_path / "stderr").write_text("noise", "utf-8")
+    found = jobs_files._words(tmp_path, state, None)
+    assert found.startswith(words) and bool(found) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("notes", "done", "rate"),
+    [
+        (((0.0, 7, 10, "a"), (8.0, 8, 10, "b"), (10.0, 9, 10, "b")), 9, 0.5),
+        (((0.0, 3, 50, "a"), (4.0, 5, 50, "b"), (8.0, 15, 50, "c")), 15, 1.5),
+        (((0.0, 40, 50, "a"), (4.0, 5, 50, "a"), (12.0, 11, 50, "a")), 11, 0.75),
+        (((1.0, 0, 50, "a"), (59.5, 2, 50, "a"), (61.5, 8, 50, "a")), 8, 3.0),
+        (((1.0, 0, 50, "a"), (59.5, 2, 50, "a"), (61.0, 8, 50, "a")), 8, 8.0 / 60.0),
+    ],
+)
+def test_the_pace_is_that_of_the_oldest_note_of_this_phase_within_a_minute(tmp_path, notes, done, rate):
+    found = progress_of(tmp_path, *notes)
+    assert (found.done, found.rate_1_s) == (done, pytest.approx(rate))
+
+
+def test_jobs_are_listed_by_number_and_not_by_name(studio, monkeypatch, tmp_path):
+    monkeypatch.setattr(jobs_module, "start_waiting", lambda folder: None)
+    for number in (2, 10, 9):
+        written(studio.folder, number, cwd=str(tmp_path), title=f"job {number}")
+    for name in ("0", "01", "x7", "7x", "1234567890123"):
+        (studio.folder / name).mkdir()
+    (studio.folder / "5").touch()
+    assert [job.number for job in studio.listed()] == [10, 9, 2]
+    assert studio.get(9).title == "job 9"
+    (studio.folder / "last").write_text("4", "utf-8")
+    assert studio._next_number() == 11
+    (studio.folder / "last").write_text("123456789", "utf-8")
+    assert studio._next_number() == 123456790
+    for damaged in ("1234567890", "x", ""):
+        (studio.folder / "last").write_text(damaged, "utf-8")
+        assert studio._next_number() == 11
+    (studio.folder / "11").touch()
+    assert studio._next_number() == 12
+
+
+def test_the_oldest_job_that_waits_is_started_while_none_runs(studio, tmp_path):
+    jobs = studio.folder
+    three, two, one = (written(jobs, number, cwd=str(tmp_path)) for number in (3, 2, 1))
+    assert jobs_process._waiting(jobs) == one
+    jobs_files.note(one / "exit.json", code=0)
+    assert jobs_process._waiting(jobs) == two
+    (two / "cancel").touch()
+    assert jobs_process._waiting(jobs) == three
+    jobs_files.note(two / "started.json")
+    with jobs_files.held(two / "alive", 0.0):
+        assert jobs_process._waiting(jobs) is None
+    assert jobs_process._waiting(jobs) == three
+    (three / "cancel").touch()
+    assert jobs_process._waiting(jobs) is None
+
+
+def test_what_a_job_prints_to_either_stream_is_kept_apart(studio, tmp_path):
+    folder = written(studio.folder, 4, cwd=str(tmp_path))
+    (folder / "stdout").write_text("said µ", "utf-8")
+    (folder / "stderr").write_bytes(b"told \xff")
+    found = [studio.output(4), studio.output(4, "stderr"), studio.output(4, "job.json")]
+    assert found == ["said µ", "told \ufffd", "said µ"]
+    (folder / "job.code").write_text("0", "utf-8")
+    assert studio.output(4) == studio.output(4, "stderr") == ""
+
+
+@pytest.mark.parametrize(
+    ("number", "do", "words"),
+    [
+        (7, "get", "there is no job 7 any more; it was removed, or never started"),
+        (2, "cancel", "job 2 is not running any more (done); there is nothing to cancel"),
+        (3, "remove", "job 3 is queued; cancel it first"),
+        (5, "output", "there is no job 5 any more; it was removed, or never started"),
+    ],
+)
+def test_what_cannot_be_done_with_a_job_names_it_and_its_state(studio, tmp_path, number, do, words):
+    for each in (2, 3):
+        written(studio.folder, each, cwd=str(tmp_path))
+    for name in ("started", "exit"):
+        jobs_files.note(studio.folder / "2" / f"{name}.json", code=0)
+    with pytest.raises(JobError) as refusal:
+        getattr(studio, do)(number)
+    assert str(refusal.value) == words
+
+
+@pytest.mark.parametrize(("exits", "code"), [((None, None, 5), 5), ((None, -2), -2), ((0,), 0)])
+def test_a_command_is_asked_by_one_signal_after_the_other_until_it_ends(tmp_path, monkeypatch, exits, code):
+    sent, waited, left = [], [], list(exits)
+
+    def wait(patience_s=None):
+        waited.append(patience_s)
+        found = left.pop(0)
+        if found is None:
+            raise subprocess.TimeoutExpired("x", patience_s)
+        return found
+
+    monkeypatch.setattr(jobs_process, "_signal", lambda command, number: sent.append(number))
+    (tmp_path / "cancel").touch()
+    found = jobs_process._ended(SimpleNamespace(wait=wait), tmp_path / "cancel", (1.5, 2.5), 0.25)
+    assert found == code
+    assert sent == [signal.SIGINT, signal.SIGTERM, signal.SIGKILL][: len(exits)]
+    assert waited == [1.5, 2.5, None][: len(exits)]
+
+
+def test_a_command_sees_its_arguments_its_folder_and_where_its_progress_goes(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(jobs_process.subprocess, "Popen", lambda *given, **more: asked.append((given, more)))
+    monkeypatch.setenv("OWN", "kept")
+    job = jobs_files.Job(1, tmp_path / "jobs" / "1", "queued", arguments=("run", "m.toml"), cwd=tmp_path / "work")
+    jobs_process._command(job, ("python", "-x"), "out", "errors")
+    (((command,), how),) = asked
+    assert command == ["python", "-x", "run", "m.toml"]
+    assert (how["stdin"], how["stdout"], how["stderr"], how["cwd"]) == (
+        subprocess.PIPE,
+        "out",
+        "errors",
+        tmp_path / "work",
+    )
+    assert (how["env"]["MICRORAD_PROGRESS"], how["env"]["OWN"]) == (str(tmp_path / "jobs" / "1" / "progress"), "kept")
+    assert how["start_new_session"] is True

@@ -714,3 +714,121 @@ def test_a_budget_as_text_loads_no_compiled_loops(loads):
     code = f"import {names}; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == str(bool(loads))
+
+
+# ---------------------------------------------------------------------------------------------- files beside each other
+def test_a_draft_and_the_other_mission_are_kept_apart_and_both_come_back(file):
+    other = file.with_name("b.toml")
+    other.write_text(file.read_text("utf-8").replace('"5 cm"', '"7 cm"'), "utf-8")
+    session = Session(file.parent, file)
+    session.set(APERTURE, "6 cm")
+    session.other = Draft.open(other).set(APERTURE, "8 cm")
+    again = Session(file.parent)
+    assert (again.draft.path, again.draft.values[APERTURE].typed) == (file, "6 cm")
+    assert (again.other.path, again.other.values[APERTURE].typed) == (other, "8 cm")
+    assert (again.draft.disk_sha256, again.other.disk_sha256) == (Draft.open(file).sha256, Draft.open(other).sha256)
+    again.other = None
+    assert Session(file.parent).other is None
+    assert Session(file.parent).draft.values[APERTURE].typed == "6 cm"
+
+
+def test_a_draft_that_replaces_another_is_opened_and_one_that_is_changed_is_not(file):
+    session = Session(file.parent, file)
+    counts = [(session.revision, session.opened)]
+    for change in (
+        lambda: session.set(APERTURE, "6 cm"),
+        lambda: session.replace(session.draft),
+        lambda: session.replace(Draft.shipped(session.inside("n.toml"))),
+        lambda: session.save("n.toml"),
+        session.reopen,
+        lambda: setattr(session, "other", None),
+    ):
+        change()
+        counts.append((session.revision, session.opened))
+    assert counts == [(0, 0), (1, 0), (2, 1), (4, 2), (5, 2), (6, 3), (7, 3)]
+
+
+def test_a_name_is_that_within_the_folder_and_whole_elsewhere(file, tmp_path_factory):
+    session, outside = Session(file.parent), tmp_path_factory.mktemp("outside") / "x.toml"
+    assert session.name_of(file.parent / "inner" / "x.toml") == "inner/x.toml"
+    assert session.name_of(outside) == str(outside)
+    assert session.inside("inner/../x.toml") == file.parent / "x.toml"
+
+
+def test_a_draft_behind_a_link_that_has_come_in_its_place_is_not_saved(file):
+    session = Session(file.parent, file)
+    session.set(APERTURE, "6 cm")
+    kept = file.with_name("kept.toml")
+    file.rename(kept)
+    file.symlink_to(kept)
+    with pytest.raises(DraftError) as refusal:
+        session.save()
+    assert str(refusal.value) == (
+        f"{file} is or lies behind a link to {kept} now, which it was not when it was opened; remove the link, or save "
+        "under another name"
+    )
+    assert '"6 cm"' not in kept.read_text("utf-8")
+    session.save("new.toml")
+    assert '"6 cm"' in (file.parent / "new.toml").read_text("utf-8")
+    assert (session.draft.path.name, session.draft.changed, session.disk) == ("new.toml", False, "")
+
+
+@pytest.mark.parametrize(
+    ("change", "seen"),
+    [
+        (lambda path: path.write_text("name = 'x'", "utf-8"), "changed"),
+        (lambda path: path.unlink(), "gone"),
+        (lambda path: path.chmod(0o600), ""),
+        (lambda path: os.utime(path, (1.0, 2.0)), ""),
+    ],
+)
+def test_what_becomes_of_a_file_is_a_revision_once(file, change, seen):
+    session = Session(file.parent, file)
+    assert (session.disk, session.revision) == ("", 0)
+    change(file)
+    assert [session.disk, session.disk] == [seen, seen]
+    assert session.revision == bool(seen)
+
+
+@pytest.mark.parametrize(
+    ("note", "words"),
+    [
+        ('{"pid": 4711, "at": ""}', ", process 4711"),
+        ('{"pid": "12"}', ", process 12"),
+        ('{"pid": null}', ""),
+        ('{"at": 1}', ""),
+        ("[1]", ""),
+        ("{", ""),
+        (None, ""),
+    ],
+)
+def test_the_process_of_another_studio_is_named_where_its_note_can_be_read(tmp_path, note, words):
+    if note is not None:
+        (tmp_path / "open.json").write_text(note, "utf-8")
+    assert server._process(tmp_path / "open.json") == words
+
+
+def test_results_of_two_jobs_are_those_of_their_own_places(file):
+    session = Session(file.parent)
+    for name in ("a.html", "b.html", "c.nc"):
+        (file.parent / name).write_text(name, "utf-8")
+    written(session.jobs.folder, 1, cwd=str(file.parent), results=("a.html", "c.nc"))
+    written(session.jobs.folder, 2, cwd=str(file.parent), results=("c.nc", "b.html"))
+    found = {(n, place): server.result(session, n, place) for n in (1, 2) for place in (0, 1, 2)}
+    assert {key: None if path is None else path.name for key, path in found.items()} == {
+        (1, 0): "a.html",
+        (1, 1): "c.nc",
+        (1, 2): None,
+        (2, 0): "c.nc",
+        (2, 1): "b.html",
+        (2, 2): None,
+    }
+
+
+def test_a_studio_that_is_exposed_answers_under_that_name_alone(monkeypatch):
+    listener = SimpleNamespace(getsockname=lambda: ("", 80))
+    monkeypatch.setattr(server, "_bound", lambda *place: listener)
+    for exposed, names in (("Lab.Example", ("lab.example",)), ("::1", ("[::1]",)), (None, ("127.0.0.1",))):
+        entrance = server.listen(80, exposed)
+        assert (entrance.names, entrance.listener) == (names, listener)
+        assert entrance.url == f"http://{names[0]}/?token={entrance.token}"
