@@ -1442,3 +1442,322 @@ def test_a_folder_of_the_bench_keeps_what_is_said_of_the_mirror(monkeypatch, tmp
     assert (found.recordings, found.validation) == ((both[0][0],), (both[1][0],))
     assert (found.virtual, found.lever_arm_m, found.positions_m, accepted) == (True, 0.05, places, [("drift",)])
     assert recordings.given_recordings(recordings.Options((tmp_path,))).positions_m is None
+
+
+# --------------------------------------------------------------------------------------- several files, options at once
+def test_files_of_drives_and_of_outputs_are_read_in_pairs_and_those_for_validation_come_last(monkeypatch):
+    read = []
+
+    def arrays(*given, **options):
+        read.append((given, options["output_path"], options["period_samples"], options["accept"]))
+        return tuple(made_up(1, 1) for _ in range(len(read)))
+
+    monkeypatch.setattr("microrad.lab.recording.read_arrays", arrays)
+    options = recordings.Options(
+        (Path("u1"), Path("u2")),
+        ("u",),
+        ("y",),
+        (Path("y1"), Path("y2"), Path("y3")),
+        axes="samples,periods",
+        rate=625.5,
+        period=12,
+        accept=("drift", "clipping"),
+        validate=(Path("u3"),),
+        lever_arm=0.0375,
+    )
+    found = recordings.given_recordings(options)
+    more = "u", "y", 625.5
+    assert read == [((Path(f"u{n}"), *more), Path(f"y{n}"), 12, ("drift", "clipping")) for n in (1, 2, 3)]
+    assert (len(found.recordings), len(found.validation), found.lever_arm_m) == (3, 3, 0.0375)
+    assert (found.virtual, found.name, found.positions_m, found.signs) == (False, None, None, None)
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.given_recordings(replace(options, output_file=options.output_file[:2]))
+    assert str(refusal.value) == (
+        "--output-file is given 2 times and there are 3 files of drives; give one for each FILE, and then for each "
+        "--validate, in their order."
+    )
+
+
+def test_columns_of_tables_are_read_with_all_that_is_said_of_them(monkeypatch):
+    read = []
+    monkeypatch.setattr(
+        "microrad.lab.recording.read_recording", lambda *given, **more: read.append((given, more)) or made_up(1, 1)
+    )
+    options = recordings.Options(
+        (Path("a"), Path("b")),
+        ("u", "v"),
+        ("y",),
+        rate=7.5,
+        time="t",
+        period=9,
+        accept=("drift",),
+        validate=(Path("c"),),
+    )
+    found = recordings.given_recordings(options)
+    more = {"time": "t", "period_samples": 9, "accept": ("drift",), "alone": False}
+    assert read == [((Path(name), ("u", "v"), ("y",), 7.5), more) for name in "abc"]
+    assert (len(found.recordings), len(found.validation)) == (2, 1)
+
+
+@pytest.mark.parametrize("place", ["files", "validate"])
+def test_a_list_among_other_files_is_named(place):
+    given = {"files": (Path("a.csv"),), "validate": (), place: (Path("b.csv"), Path("l.toml"), Path("m.toml"))}
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.given_recordings(recordings.Options(**given))
+    assert str(refusal.value) == "l.toml is a list of recordings: give it alone, and name the other files in it."
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "flag"),
+    [
+        ("output", ("y",), "--output"),
+        ("axes", "samples", "--axes"),
+        ("time", "t", "--time"),
+        ("period", 5, "--period"),
+        ("accept", ("drift",), "--accept"),
+        ("validate", (Path("v.csv"),), "--validate"),
+        ("position", ((0.0, 0.0),), "--position"),
+        ("lever_arm", 0.0, "--lever-arm"),
+    ],
+)
+def test_each_option_for_files_is_refused_beside_a_list(option, value, flag):
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.given_recordings(recordings.Options((Path("l.toml"),), **{option: value}))
+    words = f"l.toml is a list of recordings and {flag} is for files: write it into the list instead."
+    assert str(refusal.value) == words
+
+
+def named(path, units, names=("u", "y")):
+    return SimpleNamespace(path=path, input_names=names[:1], output_names=names[1:], **units)
+
+
+@pytest.mark.parametrize(
+    ("which", "option", "found"),
+    [
+        ("input", None, ("mV", "stated in the files")),
+        ("output", None, ("mrad", "assumed, --output-unit says otherwise")),
+        ("input", "mV", ("mV", "given")),
+        ("output", "um", ("um", "given")),
+    ],
+)
+def test_the_unit_of_a_channel_is_given_stated_or_assumed(which, option, found):
+    first = named("a.csv", {"input_units": ("",), "output_units": ("",)})
+    second = named("b.csv", {"input_units": ("mV",), "output_units": ("",)})
+    given = recordings.Given((first,), (second,))
+    assert recordings.unit_of(given, which, option, "V" if which == "input" else "mrad") == found
+
+
+def test_units_that_recordings_say_otherwise_are_told_with_their_files():
+    given = recordings.Given(
+        (
+            named("a.csv", {"input_units": ("V",), "output_units": ("urad",)}),
+            named("b.csv", {"input_units": ("V",), "output_units": ("mrad",)}),
+        ),
+        (named("c.csv", {"input_units": ("V",), "output_units": ("urad",)}),),
+    )
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.unit_of(given, "output", None, "mrad")
+    assert str(refusal.value) == (
+        "the files say different units of the output, urad (a.csv), mrad (b.csv): identify them apart, or convert them."
+    )
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.unit_of(given, "output", "urad", "mrad")
+    assert str(refusal.value) == (
+        "--output-unit is urad and the files say mrad, urad: give what the files say, or neither."
+    )
+    assert recordings.unit_of(given, "input", None, "V") == ("V", "stated in the files")
+
+
+@pytest.mark.parametrize(
+    ("text", "place"), [("12 mm,-6.5 mm", (0.012, -0.0065)), (" 1 um , 2 m ", (1e-6, 2.0)), ("0 m,0 m", (0.0, 0.0))]
+)
+def test_a_place_has_its_first_length_across(text, place):
+    assert lab._place(text) == pytest.approx(place, rel=1e-12)
+
+
+@pytest.mark.parametrize("text", ["12 mm", "1 mm,2 mm,3 mm", ""])
+def test_what_is_no_place_is_refused_as_it_was_typed(text):
+    with pytest.raises(typer.BadParameter) as refusal:
+        lab._place(text)
+    assert str(refusal.value) == f"'{text}' is no place; give x and y as '12 mm,-6 mm'."
+
+
+@pytest.mark.parametrize(
+    ("given", "folder_name", "seed", "overwrite"),
+    [
+        ((), "my plan-bench", 0, False),
+        (("--output", "a b/c", "--seed", "17", "--overwrite"), "a b/c", 17, True),
+    ],
+)
+def test_a_plan_is_played_into_the_folder_that_is_named(call, folder, monkeypatch, given, folder_name, seed, overwrite):
+    asked = []
+    monkeypatch.setattr("microrad.lab.bench.load_plan", lambda plan: SimpleNamespace(name=f"plan of {plan}"))
+    monkeypatch.setattr("microrad.lab.bench.check_folder", lambda *given: asked.append(given))
+
+    def write(found, *more):
+        asked.append(more[:3])
+        return [more[0] / name for name in ("x.csv", "y.csv", "plan.toml")]
+
+    monkeypatch.setattr("microrad.lab.bench.write_folder", write)
+    result = call("bench", "sub/my plan.toml", *given)
+    files = "\n".join(f"{folder_name}/{name}" for name in ("x.csv", "y.csv", "plan.toml"))
+    named = shlex.quote(folder_name)
+    assert result.out == f"{files}\n\n3 files written. Next: microrad identify {named}\n"
+    assert asked == [(Path(folder_name), overwrite), (Path(folder_name), seed, overwrite)]
+    data = json.loads(call("bench", "sub/my plan.toml", *given, "--json").out)
+    assert (data["plan"], data["folder"], data["files"]) == (
+        "plan of sub/my plan.toml",
+        folder_name,
+        files.splitlines(),
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "passed"),
+    [
+        ((), ("zero-order", False, "mrad", "V", None)),
+        (("--measured-drive", "--admissible"), ("first-order", True, "mrad", "V", None)),
+        (
+            ("--output-unit", "um", "--lever-arm", "37.5 mm", "--input-unit", "mV"),
+            ("zero-order", False, "um", "mV", 0.0375),
+        ),
+    ],
+)
+def test_what_is_said_of_drive_output_and_models_is_handed_on(refused, folder, monkeypatch, options, passed):
+    asked = []
+
+    def fit(recordings, hold_out, seed, models, bar, **more):
+        asked.append([more[key] for key in ("hold", "admissible", "output_unit", "input_unit", "lever_arm_m")])
+        asked.append((len(recordings), len(more["validation"]), hold_out, seed, more["side_by_side"]))
+        raise identify.IdentificationError("asked")
+
+    monkeypatch.setattr("microrad.lab.identify.identify", fit)
+    fitted, checked = write_recording(folder / "loop.csv"), write_recording(folder / "other.csv", reverse=True)
+    refused("identify", fitted, *COLUMNS, "--validate", checked, *options)
+    assert asked == [[*passed], (1, 1, None, 0, True)]
+
+
+@pytest.mark.parametrize(
+    ("checks", "width", "lines"),
+    [
+        (
+            [installation.Check("a", True, "found it"), installation.Check("b c", False, "gone", "do this, then that")],
+            41,
+            ["ok       a                 found it", "problem  b c               gone; do this,", " " * 9 + "then that"],
+        ),
+        (
+            [installation.Check("kernel cache", True, "x" * 30)],
+            20,
+            ["ok       kernel", " " * 9 + "cache", " " * 9 + "x" * 30],
+        ),
+    ],
+)
+def test_a_check_has_a_line_that_goes_on_set_in(checks, width, lines):
+    assert installation.text(checks, width).split("\n") == lines
+
+
+@pytest.mark.parametrize(
+    ("other", "source", "ok", "found", "advice"),
+    [
+        (None, True, True, "not compared: nothing says which versions were tested", ""),
+        ({}, True, True, "those of constraints.txt", ""),
+        ({"a==1": "a 2", "b==3": "b 4"}, False, True, "not all of those that were tested: a 2, b 4", ""),
+        (
+            {"a==1": "a 2", "b==3": "b 4"},
+            True,
+            False,
+            "not those of constraints.txt: a 2, b 4",
+            "in the project's folder: python -m pip install --constraint constraints.txt a==1 b==3",
+        ),
+    ],
+)
+def test_libraries_of_other_versions_are_told_apart_from_those_that_were_chosen(
+    monkeypatch, other, source, ok, found, advice
+):
+    monkeypatch.setattr(installation, "other_versions", lambda: other)
+    monkeypatch.setattr(installation, "from_source", lambda: source)
+    assert installation._pins() == installation.Check("pinned versions", ok, found, advice)
+
+
+def test_what_a_check_raises_is_told_by_its_first_line():
+    def broken():
+        raise RuntimeError("one\ntwo")
+
+    def silent():
+        raise OSError
+
+    assert installation._check("a", broken, "do") == installation.Check("a", False, "RuntimeError: one", "do")
+    assert installation._check("b", silent, "do") == installation.Check("b", False, "OSError: ", "do")
+    assert installation._check("c", lambda: (True, "x"), "do") == installation.Check("c", True, "x", "")
+
+
+@pytest.mark.parametrize(
+    ("make", "given", "words"),
+    [
+        (lambda path: None, {}, "{path}: there is no folder {parent}; create it first."),
+        (lambda path: path.write_text("# Mine"), {}, "{path} exists and is left as it is; do this."),
+        (
+            lambda path: path.write_text("# Mine"),
+            {"begins": b"# Mine"},
+            "{path} exists and is left as it is; do this, or replace it with --overwrite.",
+        ),
+        (
+            lambda path: path.write_text("# Other"),
+            {"begins": b"# Mine", "overwrite": True},
+            "{path} was not written by microrad and is left as it is; do this.",
+        ),
+        (
+            lambda path: path.symlink_to("nowhere"),
+            {"begins": b"# Mine"},
+            "{path} exists and is left as it is; do this, or replace it with --overwrite.",
+        ),
+        (lambda path: path.write_text(""), {"overwrite": True}, "{path} exists and is left as it is; do this."),
+    ],
+)
+def test_a_file_that_must_not_be_written_says_what_to_do(tmp_path, make, given, words):
+    path = tmp_path / ("none/x" if "there is no folder" in words else "x")
+    make(path)
+    with pytest.raises(frame.Refusal) as refusal:
+        frame.check_target(path, "do this", **given)
+    assert str(refusal.value) == words.format(path=path, parent=path.parent)
+
+
+def test_a_refusal_names_the_file_that_it_is_of_and_the_page_that_says_more(capsys):
+    with pytest.raises(frame.Refusal, match=r"^m\.toml: no$"), frame.refusal_of(Path("m.toml")):
+        raise ValueError("no")
+    refusal, cause = frame.Refusal("not so"), ValueError()
+    cause.page = "bench"
+    refusal.__cause__ = cause
+    assert frame._failed(refusal) == frame.REFUSED
+    refusal.page = "link"
+    assert frame._failed(refusal) == frame.REFUSED
+    assert capsys.readouterr().err == ("microrad: not so (see docs/bench.md)\nmicrorad: not so (see docs/link.md)\n")
+
+
+def test_a_mission_is_written_with_the_command_that_goes_on_with_it(call, folder):
+    result = call("init", "my mission.toml")
+    assert result.out == "my mission.toml written. Next: microrad run 'my mission.toml'\n"
+    assert (folder / "my mission.toml").read_text("utf-8") == PAPER.read_text("utf-8")
+    again = call("init", "my mission.toml")
+    assert again.err == (
+        "microrad: my mission.toml exists and is left as it is; name another one (microrad init other.toml) or go on "
+        "with: microrad run 'my mission.toml'.\n"
+    )
+    assert again.code == 2
+
+
+@pytest.mark.parametrize(("whole", "unknown"), [(True, ()), (False, ("a.b", "c.d"))])
+def test_a_preset_says_what_is_to_be_given_first(call, folder, monkeypatch, whole, unknown):
+    chosen = SimpleNamespace(name="mine", whole=whole, unknown=unknown)
+    other = SimpleNamespace(name="other", whole=not whole, unknown=("x",))
+    monkeypatch.setattr("microrad.mission.presets.preset_text", lambda name: f"# {name}")
+    monkeypatch.setattr("microrad.mission.presets.presets", lambda: (other, chosen))
+    first = "To be given first: a.b, c.d. " if unknown else ""
+    command = "run" if whole else "budget"
+    assert call("init", "--preset", "mine").out == f"mine.toml written. {first}Next: microrad {command} mine.toml\n"
+    assert (folder / "mine.toml").read_text("utf-8") == "# mine"
+    assert call("init", "--preset", "mine", "a b.toml").out.endswith(f"Next: microrad {command} 'a b.toml'\n")
+    said = call("init", "--preset", "mine").err
+    assert said == (
+        "microrad: mine.toml exists and is left as it is; name another one: microrad init --preset mine other.toml.\n"
+    )
