@@ -8,6 +8,8 @@ import sqlite3
 import subprocess
 import sys
 from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,7 +19,9 @@ from microrad.campaign import run
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, mending
 from microrad.campaign.records import CampaignError
+from microrad.cli import campaign as cli_campaign
 from microrad.cli.campaign import campaigns
+from microrad.cli.frame import Outcome, Refusal
 from small_campaign import Here, without_worker
 from waiting import no_hang
 
@@ -423,3 +427,113 @@ def test_optimise_says_when_no_design_will_do(call, folder):
 
 def test_optimise_needs_its_table(there, refused):
     assert "there is no table [optimise] in it" in refused("campaign", "optimise", "campaign.toml")
+
+
+# ---------------------------------------------------------------------------------------------- option by option
+@pytest.mark.parametrize("as_json", [False, True])
+@pytest.mark.parametrize(
+    ("damaged", "faults"), [((), ()), (((0, 3), (2, 11)), ()), ((), ("odd index", "odd page")), (((4, 1),), ("odd",))]
+)
+def test_each_damaged_chunk_and_each_fault_of_a_ledger_is_told(call, monkeypatch, damaged, faults, as_json):
+    from microrad.campaign import ledger as ledgers
+
+    found = mending.Verified(17, damaged, ((5, 6),), faults)
+    monkeypatch.setattr(ledgers, "verify", lambda path: found)
+    shown = call("campaign", "verify", "my rows.ledger", *["--json"] * as_json)
+    sound = not damaged and not faults
+    assert shown.code == (0 if sound else 1)
+    if as_json:
+        data = json.loads(shown.out)
+        assert (data["checked"], data["sound"]) == (17, sound)
+        assert data["damaged"] == [list(each) for each in damaged] and data["faults"] == list(faults)
+        return
+    lines = ["17 chunks with a right checksum"]
+    lines += [f"damaged: chunk {number} of cell {cell}" for cell, number in damaged]
+    lines += [f"damaged: {fault}" for fault in faults]
+    again = "Next: microrad campaign resume 'my rows.ledger' does again what is damaged, and nothing else"
+    assert shown.out.splitlines() == [*lines, *[again] * (not sound)]
+
+
+@pytest.mark.parametrize(
+    ("options", "means", "ledger"),
+    [
+        ((), (None, None, None), "sub/tails.v2.ledger"),
+        (("--threads", 3), (3, None, None), "sub/tails.v2.ledger"),
+        (("--workers", 5, "--ledger", "x.ledger"), (None, 5, None), "x.ledger"),
+        (("--scheduler", "tcp://head:8786"), (None, None, "tcp://head:8786"), "sub/tails.v2.ledger"),
+        (("--scheduler", "head:1"), (None, None, "head:1"), "sub/tails.v2.ledger"),
+    ],
+)
+def test_a_campaign_is_run_by_the_means_and_into_the_ledger_that_are_given(call, monkeypatch, options, means, ledger):
+    asked = []
+    monkeypatch.setattr("microrad.campaign.run.run_campaign", lambda *given: asked.append(given[:3]))
+    monkeypatch.setattr("microrad.campaign.run.resume_campaign", lambda *given: asked.append(given[:2]))
+    monkeypatch.setattr(cli_campaign, "_shown", lambda path, as_json: Outcome(f"{path} {as_json}", 1))
+    shown = call("campaign", "run", "sub/tails.v2.toml", *options)
+    assert (shown.code, shown.out) == (1, f"{ledger} False\n")
+    assert asked == [(Path("sub/tails.v2.toml"), Path(ledger), run.Means(*means))]
+    asked.clear()
+    given = [each for each in options if each not in ("--ledger", "x.ledger")]
+    assert call("campaign", "resume", "y.ledger", *given, "--json").out == "y.ledger True\n"
+    assert asked == [(Path("y.ledger"), run.Means(*means))]
+
+
+@pytest.mark.parametrize(
+    ("address", "taken"),
+    [("tls://a:1", True), ("ucx://a-b.c:65535", True), ("http://a:1", False), ("a:123456", False), ("a/b:1", False)],
+)
+def test_an_address_is_one_that_dask_knows(address, taken):
+    if taken:
+        assert cli_campaign._means(None, None, address) == run.Means(None, None, address)
+        return
+    with pytest.raises(Refusal) as refusal:
+        cli_campaign._means(None, None, address)
+    assert str(refusal.value) == (
+        f"--scheduler {address!r} is no address; `dask scheduler` prints its own, tcp://head:8786 say."
+    )
+
+
+@pytest.mark.parametrize(("verdict", "code"), [("pass", 0), ("fail", 1), ("open", 1), ("", 1)])
+def test_only_rows_that_keep_all_limits_are_exit_0(call, monkeypatch, verdict, code):
+    monkeypatch.setattr("microrad.campaign.statistics.summary.summarise_campaign", lambda path: f"of {path}")
+    monkeypatch.setattr("microrad.report.campaign.words.verdict", lambda found: verdict)
+    monkeypatch.setattr("microrad.report.campaign.text.campaign_text", lambda found, width: f"{found}, {width}")
+    monkeypatch.setattr("microrad.report.campaign.data.campaign_data", lambda found: {"found": found})
+    shown, data = call("campaign", "status", "a.ledger"), call("campaign", "status", "a.ledger", "--json")
+    assert (shown.code, shown.out) == (code, "of a.ledger, 80\n\na.ledger\n")
+    assert (data.code, json.loads(data.out)) == (code, {"found": "of a.ledger", "ledger": "a.ledger"})
+
+
+def test_the_page_of_a_ledger_lies_beside_it_under_its_own_name(call, folder, monkeypatch):
+    monkeypatch.setattr("microrad.campaign.statistics.summary.summarise_campaign", lambda path: path)
+    monkeypatch.setattr("microrad.report.campaign.page.campaign_page", lambda found: f"<!DOCTYPE html>{found}")
+    (folder / "sub").mkdir()
+    assert call("campaign", "report", "sub/tails.v2.ledger").out == "sub/tails.v2.html\n"
+    assert (folder / "sub" / "tails.v2.html").read_text("utf-8") == "<!DOCTYPE html>sub/tails.v2.ledger"
+    assert call("campaign", "report", "sub/tails.v2.ledger", "other").out == "other\n"
+    again = call("campaign", "report", "x.ledger", "other", "--overwrite")
+    assert (again.code, (folder / "other").read_text("utf-8")) == (0, "<!DOCTYPE html>x.ledger")
+
+
+@pytest.mark.parametrize("confirmed", [True, False])
+def test_the_optimum_is_exit_0_where_rows_confirm_it(call, monkeypatch, confirmed):
+    asked = []
+    found = SimpleNamespace(confirmed=confirmed)
+    monkeypatch.setattr(
+        "microrad.campaign.optimisation.campaign.optimise_campaign",
+        lambda file, threads, progress: asked.append((file, threads)) or found,
+    )
+    monkeypatch.setattr("microrad.report.campaign.optimum.optimum_text", lambda found: "the optimum")
+    monkeypatch.setattr("microrad.report.campaign.optimum.optimum_data", lambda found: {"cost": 2.5})
+    shown = call("campaign", "optimise", "c.toml", "--threads", 7)
+    data = call("campaign", "optimise", "c.toml", "--json")
+    assert (shown.code, shown.out) == (int(not confirmed), "the optimum\n")
+    assert (data.code, json.loads(data.out)) == (int(not confirmed), {"cost": 2.5})
+    assert asked == [(Path("c.toml"), 7), (Path("c.toml"), None)]
+
+
+def test_a_campaign_is_written_in_another_folder_beside_its_mission(call, folder):
+    (folder / "a b").mkdir()
+    shown = call("campaign", "init", "a b/tails.toml")
+    assert shown.out == ("a b/tails.toml written, for a b/leo-geo.toml. Next: microrad campaign run 'a b/tails.toml'\n")
+    assert sorted(listing(folder / "a b")) == ["leo-geo.toml", "tails.toml"]

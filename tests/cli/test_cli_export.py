@@ -13,6 +13,7 @@ from microrad.cli import export as cli_export
 from microrad.export import choice
 from microrad.export.flight import build, write
 from microrad.export.fmi import fmu
+from microrad.export.linear_import import Given
 from microrad.loop import controller_study
 from microrad.mission.file import load_mirror, load_mission
 from shipped import SHIPPED, without_fine_pointing
@@ -320,3 +321,78 @@ def test_an_imported_mirror_is_called_as_its_file_or_as_is_said(call, folder, mo
     numbers = said.travel_rad, said.rate_limit_v_s, said.bias_v, said.drive_min_v, said.drive_max_v
     assert numbers == pytest.approx((2.5e-3, 3770.0, 6.0, 0.0, 12.0), rel=1e-12)
     assert (said.excited_from_hz, said.excited_to_hz, said.normalise_at_hz) == (1.0, 5000.0, 2.0)
+
+
+def test_each_number_of_an_import_is_that_of_its_own_option(call, folder, monkeypatch):
+    taken = []
+    monkeypatch.setattr("microrad.export.linear_import.import_mat", lambda *given: taken.append(given) or "# Mirror")
+    options = (
+        *("--travel", "3.5 mrad", "--drive", "-7 V", "13 V", "--bias", "2500 mV", "--rate-limit", "4.5 kV/s"),
+        *("--band", "3 Hz", "6.25 kHz", "--normalise-at", "11 Hz", "--output-unit", "urad", "--variable", "sys"),
+    )
+    (folder / "sub").mkdir()
+    result = call("import", "sub/m.mat", *options, "--output", "sub/it is.toml")
+    assert result.out == "sub/it is.toml written. Next: microrad run leo-geo.toml --mirror 'sub/it is.toml'\n"
+    ((file, given, variable),) = taken
+    assert (str(file), variable) == ("sub/m.mat", "sys")
+    assert given == Given(
+        name="m",
+        travel_rad=pytest.approx(3.5e-3),
+        rate_limit_v_s=pytest.approx(4500.0),
+        bias_v=pytest.approx(2.5),
+        drive_min_v=-7.0,
+        drive_max_v=13.0,
+        excited_from_hz=3.0,
+        excited_to_hz=pytest.approx(6250.0),
+        normalise_at_hz=11.0,
+        output_unit="urad",
+    )
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        ("--travel", ("3 V",), "--travel: "),
+        ("--drive", ("0 V", "12"), "--drive: "),
+        ("--drive", ("zero", "12 V"), "--drive: "),
+        ("--bias", ("6 mrad",), "--bias: "),
+        ("--rate-limit", ("3770 V",), "--rate-limit: "),
+        ("--band", ("1 Hz", "5 V"), "--band: "),
+        ("--normalise-at", ("2",), "--normalise-at: "),
+    ],
+)
+def test_a_number_of_an_import_is_refused_under_the_name_of_its_option(refused, option, value, words):
+    said = refused("import", "m.mat", *IMPORT, option, *value)
+    wrong = next(each for each in value if each not in ("0 V", "12 V", "1 Hz"))
+    assert said.startswith(f"microrad: {words}") and f'"{wrong}"' in said
+
+
+@pytest.mark.parametrize(
+    ("given", "folder_name", "name", "precision", "flags"),
+    [
+        ((), "leo-geo-pi_inverse", "pi_inverse", "double", (False, False)),
+        (("--precision", "fixed", "--accept"), "leo-geo-pi_inverse", "pi_inverse", "fixed", (False, True)),
+        (("--name", "fsm", "--overwrite"), "leo-geo-fsm", "fsm", "double", (True, False)),
+        (("--output", "a b", "--precision", "single"), "a b", "pi_inverse", "single", (False, False)),
+    ],
+)
+def test_code_is_written_as_it_is_asked_for(mission, call, monkeypatch, given, folder_name, name, precision, flags):
+    asked = []
+
+    def exported(chosen, folder, **more):
+        asked.append((chosen, str(folder), more))
+        return "found"
+
+    monkeypatch.setattr(cli_export, "_chosen", lambda mission, several, wanted, progress: wanted)
+    monkeypatch.setattr(write, "export_flight", exported)
+    monkeypatch.setattr(write, "report_text", lambda found: f"{found} in words")
+    monkeypatch.setattr(write, "export_data", lambda found: {"data": found})
+    monkeypatch.setattr(write, "check_output", lambda *given: asked.append(given))
+    file = mission / "leo-geo.toml"
+    result = call("export", "c", file, *given)
+    (checked, overwrite), (chosen, folder, more) = asked
+    more.pop("on_progress")
+    assert (str(checked), overwrite, chosen, folder) == (folder_name, flags[0], "PI + inverse", folder_name)
+    assert more == {"name": name, "precision": precision, "overwrite": flags[0], "accept": flags[1]}
+    assert result.out == f"found in words\n\n{folder}\n"
+    assert json.loads(call("export", "c", file, *given, "--json").out) == {"data": "found", "folder": folder}
