@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -344,3 +345,38 @@ def test_where_nothing_goes_direct_the_relays_volume_is_what_matters(call, folde
     )
     assert "nothing direct" not in said
     assert "by the direct downlink nothing arrives" in said
+
+
+@pytest.mark.parametrize("bit", [0.0, 2.5e9])
+@pytest.mark.parametrize(("flag", "text"), [((), "text\n"), (("--csv",), "csv\n"), (("--html",), "page\n")])
+def test_a_day_in_any_form_is_exit_0_where_the_relay_carries_something(call, folder, monkeypatch, bit, flag, text):
+    day = SimpleNamespace(relay=SimpleNamespace(capacity_bit=bit), direct=SimpleNamespace(capacity_bit=1e9 - bit))
+    monkeypatch.setattr(day_study, "run_day_study", lambda links, on_progress: day)
+    monkeypatch.setattr("microrad.report.day.data.day_csv", lambda found: "csv")
+    monkeypatch.setattr("microrad.report.day.page.day_page", lambda found, links: "page")
+    monkeypatch.setattr("microrad.report.day.page.day_text", lambda found, width, sources: "text")
+    result = call("contacts", path_of(folder), *flag)
+    assert (result.code, result.out) == (int(bit == 0.0), text)
+
+
+@pytest.mark.parametrize("bit", [0.0, 2.5e9])
+@pytest.mark.parametrize(
+    ("flag", "text"),
+    [((), "text\n"), (("--csv",), "csv of 2026\n"), (("--contact-plan",), "plan\n"), (("--json",), "")],
+)
+def test_a_plan_in_any_form_is_exit_0_where_data_flow(call, folder, monkeypatch, bit, flag, text):
+    plan = SimpleNamespace(
+        volume_bit=bit, planned="planned", epoch=SimpleNamespace(utc="2026"), contact_plan=lambda: "plan"
+    )
+    monkeypatch.setattr(plans, "run_constellation", lambda file, loss, progress: plan)
+    monkeypatch.setattr(day_study, "given_loss", lambda links: 3.0)
+    monkeypatch.setattr("microrad.orbit.operations.csv_text", lambda planned, utc: f"csv of {utc}")
+    monkeypatch.setattr("microrad.report.day.constellation.plan_text", lambda found, width: "text")
+    monkeypatch.setattr("microrad.report.day.constellation.plan_data", lambda found: {"volume_bit": found.volume_bit})
+    path = path_of(folder)
+    result = call("constellation", path, *flag)
+    assert result.code == int(bit == 0.0)
+    if flag == ("--json",):
+        assert json.loads(result.out) == {"mission": load_link(path).mission.name, "volume_bit": bit}
+    else:
+        assert result.out == text

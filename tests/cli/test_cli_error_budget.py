@@ -2,11 +2,15 @@
 
 import json
 import math
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from budget_files import LIST, TABLE
+from microrad.cli import error_budget as cli_budget
+from microrad.cli.frame import Refusal
 from microrad.link.error_budget import ErrorSource, Requirement, Spread, budget
 from microrad.loop.disturbance.windows import ErrorIndex
 from shipped import SHIPPED, without_fine_pointing
@@ -187,3 +191,32 @@ def test_a_loop_that_is_asked_for_and_not_there_is_refused(refused, mission):
     told = refused("pointing", "m.toml")
     assert "error_budget.with_loop = true" in told
     assert "expected: the table [fine_pointing], which microrad init writes, or false" in told
+
+
+@pytest.mark.parametrize(
+    ("index", "observed_s"),
+    [(("APE",), None), (("RPE", 0.25), None), (("PDE", 0.25, 60.0), 60.25), (("PDE", 4.0, 7.5), 11.5)],
+)
+def test_a_list_alone_is_observed_over_both_windows_of_a_difference(index, observed_s):
+    assert cli_budget._observed(ErrorIndex(*index)) == observed_s
+
+
+def test_of_several_sources_that_are_given_twice_the_first_by_name_is_told(monkeypatch):
+    from microrad.link.error_budget import assembly
+    from microrad.mission import source_list
+
+    own = SimpleNamespace(sources=[SimpleNamespace(name=n) for n in ("zeta", "beta", "own")], required={})
+    monkeypatch.setattr(assembly, "of_mission", lambda table, sources: own)
+    monkeypatch.setattr(assembly, "source_of", lambda name, source, origin: SimpleNamespace(name=name))
+    monkeypatch.setattr(assembly, "stated", lambda sources, required, table=None: [each.name for each in sources])
+    listed = ["zeta", "new", "beta"]
+    monkeypatch.setattr(
+        source_list, "read_sources", lambda path: [SimpleNamespace(name=n, source=0, origin=0) for n in listed]
+    )
+    mission = SimpleNamespace(mission=SimpleNamespace(error_budget="table"), sources={}, path="m.toml")
+    with pytest.raises(Refusal) as refusal:
+        cli_budget.stated_beside(mission, Path("list.csv"), [])
+    assert str(refusal.value) == 'list.csv: "beta" is a source of m.toml, too: give it once'
+    listed[:] = ["new", "other"]
+    assert cli_budget.stated_beside(mission, Path("list.csv"), []) == ["zeta", "beta", "own", "new", "other"]
+    assert cli_budget.stated_beside(mission, None, []) is own

@@ -11,7 +11,9 @@ import pytest
 from scipy.signal import lfilter
 
 import several_axes
-from microrad.lab.recording import read_motion
+from microrad.cli import jitter as cli_jitter
+from microrad.cli.frame import Refusal
+from microrad.lab.recording import Motion, read_motion
 from microrad.loop.disturbance.recorded_fit import fit_recording
 from microrad.loop.pointing_loop.played import Played, RecordedResidual
 from microrad.loop.workbench import Loop
@@ -123,3 +125,50 @@ def test_a_mirror_of_several_axes_is_refused(refused, tmp_path):
     named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
     (tmp_path / "m.toml").write_text(named, encoding="utf-8")
     assert "recordings are played to one mirror an axis" in refused("jitter", "m.toml", jitter(tmp_path / "jitter.csv"))
+
+
+def test_each_axis_of_a_recording_is_fitted_by_its_own_samples_and_name(monkeypatch):
+    fitted, said, refused_at = [], [], []
+    samples = np.array([[1.0, 4.0, 7.0], [2.0, 5.0, 8.0]])
+    motion = Motion("jitter.csv", "sha", ("x", "y", "z"), samples, 250.0)
+    monkeypatch.setattr(
+        "microrad.loop.disturbance.recorded_fit.fit_recording",
+        lambda samples, step_s, name: fitted.append((samples.tolist(), step_s, name)) or name,
+    )
+    monkeypatch.setattr("microrad.loop.pointing_loop.played.refuse_short", lambda fit, s: refused_at.append((fit, s)))
+    assert cli_jitter._fits(motion, 1.25, lambda *told: said.append(told)) == ["x", "y", "z"]
+    assert fitted == [([1.0, 2.0], 4e-3, "x"), ([4.0, 5.0], 4e-3, "y"), ([7.0, 8.0], 4e-3, "z")]
+    assert refused_at == [("x", 1.25), ("y", 1.25), ("z", 1.25)]
+    assert said == [(n, 3, "fitting the recording") for n in range(3)]
+
+
+def test_a_second_axis_that_is_too_short_is_refused_under_the_name_of_the_recording(monkeypatch):
+    def short(fit, settle_s):
+        if fit == "y":
+            raise ValueError(f"{fit} ends before {settle_s:g} s")
+
+    monkeypatch.setattr("microrad.loop.disturbance.recorded_fit.fit_recording", lambda samples, step_s, name: name)
+    monkeypatch.setattr("microrad.loop.pointing_loop.played.refuse_short", short)
+    motion = Motion("my jitter.csv", "sha", ("x", "y"), np.zeros((2, 2)), 250.0)
+    with pytest.raises(Refusal, match=r"^my jitter\.csv: y ends before 0\.75 s$"):
+        cli_jitter._fits(motion, 0.75, lambda *told: None)
+
+
+@pytest.mark.parametrize(
+    ("options", "names", "rate_hz", "time", "unit"),
+    [
+        ((), [], None, None, None),
+        (("--axes", "a/x , b y", "--rate", "2.5 kHz", "--unit", "arcsec"), ["a/x", "b y"], 2500.0, None, "arcsec"),
+        (("--axes", "3", "--time", "clock"), ["3"], None, "clock", None),
+    ],
+)
+def test_a_recording_is_read_by_what_the_options_say_of_it(refused, monkeypatch, options, names, rate_hz, time, unit):
+    asked = []
+
+    def read(path, axes, rate, time, unit):
+        asked.append((str(path), axes, rate, time, unit))
+        raise Refusal("read")
+
+    monkeypatch.setattr("microrad.lab.recording.read_motion", read)
+    assert refused("jitter", DEFAULT, "sub/j.csv", *options) == "microrad: read\n"
+    assert asked == [("sub/j.csv", names, rate_hz, time, unit)]

@@ -575,3 +575,140 @@ def test_a_worst_case_is_of_the_windows_that_are_given_and_of_the_mirror_of_its_
     assert (result.code, result.out) == (0, "a text of 80 columns\n")
     known = "of_several_axes" if axes == 2 else "of_table"
     assert asked == [((known, f"LQG of {axes}"), 7, times)]
+
+
+# -------------------------------------------------------------------------------------- several designs, axes and times
+def test_designs_of_several_axes_are_told_with_both_axes_and_the_drives_of_the_best(monkeypatch):
+    monkeypatch.setattr(coupled_design, "tuned_text", lambda scene, values, margin: f"{values} {margin}")
+    left = [
+        SimpleNamespace(axes=(Outlook(1e-6, 2e-6), Outlook(3e-6, 4e-6)), simulated_rad=4.5e-6),
+        SimpleNamespace(axes=(Outlook(1.25e-6, 1.5e-6), Outlook(2.5e-6, 3.5e-6)), simulated_rad=3.8e-6),
+    ]
+    margins = [
+        SimpleNamespace(modulus=0.5, disk=SimpleNamespace(disk=0.4), bandwidth_hz=123.0),
+        SimpleNamespace(modulus=0.625, disk=SimpleNamespace(disk=0.25), bandwidth_hz=4567.0),
+    ]
+    drives = [np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.25, 0.125])]
+    made = [
+        SimpleNamespace(name=name, margins=m, tuned=f"tuned {name}", margin=None, drive_v=v)
+        for name, m, v in zip(("PI", "LQG"), margins, drives, strict=True)
+    ]
+    mirror = SimpleNamespace(
+        mirror=SimpleNamespace(name="tripod", actuators=3, axes=4),
+        actuators=[SimpleNamespace(name=f"P{n}") for n in (1, 2, 3)],
+    )
+    scene = SimpleNamespace(
+        mirror=mirror, table=SimpleNamespace(rate_hz=6250.0), static_v=(1.0, 2.0, 0.5), reach_v=(-5.0, 7.0)
+    )
+    found = SimpleNamespace(made=made)
+    text = coupled_design._text(scene, found, left, ["refused", ""], ["mind the step"])
+    said = " ".join(text.split())
+    assert "tripod: 3 actuators and 4 outputs, line of sight of 2 axes at 6.25 kHz." in said
+    rows = [line.split() for line in text.splitlines()]
+    assert ["PI", *["1.000", "/", "3.000", "2.000", "/", "4.000", "refused", "0.500", "0.400", "123", "Hz"]] in rows
+    assert ["LQG", *["1.250", "/", "2.500", "1.500", "/", "3.500", "0.625", "0.250", "4.57", "kHz"]] in rows
+    assert ["LQG", "tuned", "LQG", "None"] in rows
+    assert "actuator under LQG" in said and "with 3 rms of 5 V" in said
+    assert ["P1", "1", "0.5", "50", "%"] in rows  # of (1 + 3 · 0.5) V
+    assert ["P2", "2", "0.25", "55", "%"] in rows
+    assert ["P3", "0.5", "0.125", "17.5", "%"] in rows
+    assert said.endswith("Warning: mind the step.")
+
+
+@pytest.mark.parametrize(
+    ("named", "accept", "words"),
+    [
+        ([], False, ""),
+        ([], True, ""),
+        (
+            ["PI (1.75 times)", "LQG (2.00 times)"],
+            True,
+            "more than 1.5 times as much as linear theory says is left, simulated on the mission's mirror, by PI (1.75 "
+            "times), LQG (2.00 times): accepted as they are",
+        ),
+        (
+            ["PI (1.75 times)"],
+            False,
+            "more than 1.5 times as much as linear theory says is left, simulated on the mission's mirror, by PI (1.75 "
+            "times): refused, here and by microrad export; choose by the simulated figure, or take these with --accept",
+        ),
+    ],
+)
+def test_designs_that_do_not_keep_their_promise_are_all_named(named, accept, words):
+    assert coupled_design.broken_promises(named, accept) == words
+
+
+def test_two_designs_of_one_axis_are_told_row_by_row(monkeypatch):
+    monkeypatch.setattr(cli_pointing, "tuned_text", lambda scene, values, margin: f"{values['gain']:g} {margin}")
+    one, two = made(10.0), made(math.inf, margin=0.7)
+    two = SimpleNamespace(**{**vars(two), "name": "LQG"})
+    two.tuned = SimpleNamespace(values={"gain": 4.5}, margins=SimpleNamespace(**vars(two.tuned.margins)), bound_by=())
+    two.tuned.margins.modulus, two.tuned.margins.bandwidth_hz, two.tuned.margins.phase_rad = 0.75, 4567.0, 1.0
+    scene = SimpleNamespace(loop=SimpleNamespace(timing=SimpleNamespace(period_s=1.6e-4)))
+    figures = Outlook(1.25e-6, 1.5e-6), Outlook(2.5e-6, 7.5e-6)
+    text = cli_pointing._text(scene, (one, two), figures, ["", "refused"], [])
+    rows = [line.split() for line in text.splitlines()]
+    assert "One axis at 6.25 kHz" in text and "Warning" not in text
+    assert ["PI", "1.250", "1.500", "0.500", "90°", "20.0", "dB", "120", "Hz"] in rows
+    assert ["LQG", "2.500", "7.500", "refused", "0.750", "57°", "none", "4.57", "kHz"] in rows
+    assert ["PI", "3", "None"] in rows and ["LQG", "4.5", "0.7"] in rows
+    data = cli_pointing._data(two, figures[1], "refused")
+    assert (data["name"], data["bound_by"], data["mark"], data["inverse"]) == ("LQG", [], "refused", False)
+    assert {key: data["margins"][key] for key in ("modulus", "delay_s", "disk", "crossover_hz", "bandwidth_hz")} == {
+        "modulus": 0.75,
+        "delay_s": 1e-3,
+        "disk": 0.4,
+        "crossover_hz": 90.0,
+        "bandwidth_hz": 4567.0,
+    }
+
+
+def test_each_window_is_asked_for_with_each_spacing():
+    found = indices_of_mission(None, [0.25, 3.0], [60.0, 7.5])
+    assert [(each.kind, each.window_s, each.spacing_s) for each in found] == [
+        ("APE", None, None),
+        ("MPE", 0.25, None),
+        ("RPE", 0.25, None),
+        ("PDE", 0.25, 60.0),
+        ("PDE", 0.25, 7.5),
+        ("MPE", 3.0, None),
+        ("RPE", 3.0, None),
+        ("PDE", 3.0, 60.0),
+        ("PDE", 3.0, 7.5),
+    ]
+
+
+@pytest.mark.parametrize("word", [None, 2e-6])
+@pytest.mark.parametrize("fading", [None, "a series"])
+def test_runs_answer_for_words_and_for_a_code_where_the_mission_asks_for_them(monkeypatch, word, fading):
+    from microrad.link.pointing import code_words, coded_residual
+    from microrad.loop.controller_study import results
+    from microrad.loop.pointing_loop import simulated_windows
+
+    asked = []
+
+    def ask(questions, loop, made, span, runs, on_progress):
+        asked.append((questions, loop, made, span, runs))
+        return [f"answer to {each}" for each in questions]
+
+    monkeypatch.setattr(results, "span", lambda table: "span")
+    monkeypatch.setattr(simulated_windows, "windows_asked", lambda *given: "windows")
+    monkeypatch.setattr(simulated_windows, "ask", ask)
+    monkeypatch.setattr(code_words.FadeMargin, "of", lambda data: "margin")
+    monkeypatch.setattr(code_words, "words_asked", lambda margin, word, loop, span: f"words of {word}")
+    monkeypatch.setattr(coded_residual.CodedBeam, "of", lambda data: "beam")
+    monkeypatch.setattr(coded_residual, "coded_asked", lambda beam, loop, span: "code")
+    monkeypatch.setattr("microrad.link.of", lambda mission: mission)
+    monkeypatch.setattr("microrad.link.study.solve_rate", lambda mission: mission)
+    table = SimpleNamespace(code_word_s=word, fading=fading)
+    mission = SimpleNamespace(mission=SimpleNamespace(communication=table), path="m.toml")
+    scene = SimpleNamespace(loop="loop", table="table", theory="theory")
+    found = cli_pointing._simulated(mission, scene, "made", ["index"], 5)
+    assert found == (
+        "answer to windows",
+        None if word is None else "answer to words of 2e-06",
+        None if fading is None else "answer to code",
+    )
+    (((first, *others), *rest),) = asked
+    assert (first, rest) == ("windows", ["loop", "made", "span", 5])
+    assert others == ["words of 2e-06"] * (word is not None) + ["code"] * (fading is not None)
