@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from microrad.mission.presets import preset_text
-from microrad.report.tables import Table
-from microrad.report.view import Drawing, Points, Soft, Verdict, View
+from microrad.report.tables import Cell, Table
+from microrad.report.view import Drawing, Points, Soft, Verbatim, Verdict, View
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.jobs.files import Job, Progress
@@ -1255,3 +1255,267 @@ def test_the_files_of_an_identification_are_opened_by_their_links(session, job_v
     asyncio.run(view.look())
     links = {each.text: each.props["href"] for each in view.end.descendants() if isinstance(each, ui.link)}
     assert links == {"Open the report": "/results/7/1", "Mirror file stage.toml": "/results/7/0"}
+
+
+# ------------------------------------------------------------------------------------------ behind the first of a kind
+def test_columns_of_a_table_have_their_heading_their_side_and_their_mark(tab):
+    found = elements._columns(("name of it", "of it,\nµrad", "x"), numbers=(1,))
+    assert [(each["name"], each["field"], each["label"], each["align"]) for each in found] == [
+        ("c0", "c0", "Name of it", "left"),
+        ("c1", "c1", "Of it, µrad", "right"),
+        ("c2", "c2", "X", "left"),
+    ]
+    assert [each[":classes"] for each in found] == [
+        "row => ` ${row.mark0 ?? ''}`",
+        "row => `text-no-wrap ${row.mark1 ?? ''}`",
+        "row => ` ${row.mark2 ?? ''}`",
+    ]
+
+
+def test_a_table_of_the_report_has_its_words_at_the_left_its_sums_and_its_marks(tab):
+    made = elements.table(("a",))
+    rows = [("p", "1", Cell("2", "PASS")), ("q", "3", "4"), ("sum", "5", Cell("6", "FAIL")), ("of", "7", "8")]
+    elements.put(made, Table("", ("x", "y", "z"), rows, words=(0, 2), totals=2))
+    assert [each["align"] for each in made.columns] == ["left", "right", "left"]
+    assert made.rows == [
+        {"id": 0, "total": False, "c0": "p", "c1": "1", "c2": "2 PASS", "mark2": "PASS"},
+        {"id": 1, "total": False, "c0": "q", "c1": "3", "c2": "4"},
+        {"id": 2, "total": True, "c0": "sum", "c1": "5", "c2": "6 FAIL", "mark2": "FAIL"},
+        {"id": 3, "total": True, "c0": "of", "c1": "7", "c2": "8"},
+    ]
+    elements.put(made, Table("", ("y", "x", "z"), rows[:1], words=(0,)))
+    assert [each["label"] for each in made.columns] == ["Y", "X", "Z"]
+    assert [row["total"] for row in made.rows] == [False]
+
+
+def headings(place):
+    return [(each.tag, each.text) for each in place.descendants() if each.tag in ("h2", "h3", "h4")]
+
+
+def test_views_within_views_are_headed_a_level_lower_each(tab):
+    made = elements.Blocks()
+    inner = View("inner", (Table("of its own", ("x",), [("1",)]), Soft("soft")))
+    made.show_blocks((View("outer", (inner, Verdict("judged", (View("below", ()),), False))), View("next", ())))
+    assert headings(made) == [("h2", "outer"), ("h3", "inner"), ("h4", "of its own"), ("h3", "below"), ("h2", "next")]
+    (judged,) = (each for each in made.descendants() if getattr(each, "text", "") == "judged")
+    assert "FAIL" in judged.classes
+    looks = {Soft("s"): "soft", Verbatim("v"): "mono", Verdict("g", (), True): "PASS", "plain": None}
+    made.show_blocks(tuple(looks))
+    shown = list(made.default_slot.children)
+    assert [each.text for each in shown] == ["s", "v", "g", "plain"]
+    for each, look in zip(shown, looks.values(), strict=True):
+        assert set(each.classes) & {"soft", "mono", "PASS", "FAIL"} == ({look} if look else set())
+
+
+def test_what_is_folded_keeps_its_place_and_takes_other_words(tab):
+    made = elements.Blocks()
+
+    def blocks(n):
+        rows = [(f"r{n}", str(n))]
+        return (
+            View(f"folded {n}" if n == 0 else "folded 0", (Points((f"a{n}", f"b{n}")),), folded=True),
+            Table("t", ("x", "y"), rows, folded=f"{n} rows"),
+            f"text {n}",
+        )
+
+    made.show_blocks(blocks(0))
+    first, second = (each for each in made.descendants() if isinstance(each, ui.expansion))
+    made.show_blocks(blocks(7))
+    assert [each for each in made.descendants() if isinstance(each, ui.expansion)] == [first, second]
+    assert (first.text, second.text) == ("folded 0", "7 rows")
+    (table,) = (each for each in made.descendants() if isinstance(each, ui.table))
+    assert table.rows[0] == {"id": 0, "total": False, "c0": "r7", "c1": "7"}
+    assert [text for text in texts(made) if text[:1] in "ab"] == ["a7", "b7"]
+    assert "text 7" in texts(made)
+
+
+def test_the_second_figure_of_several_is_drawn_in_its_own_place(tab, monkeypatch):
+    shows = []
+    monkeypatch.setattr(elements.Figure, "show", lambda self, plot: shows.append((self.props["aria-label"], plot)))
+    pictures = [Drawing(name, f"title {name}", f"caption {name}", "<svg/>") for name in "ab"]
+    made = elements.Blocks()
+    made.show_blocks((View("v", pictures),), {"a": empty("a1"), "b": "data:b1"})
+    made.show_blocks((View("v", pictures),), {"a": empty("a2"), "b": "data:b2"})
+    assert shows == [("title a", empty("a2"))]
+    (picture,) = (each for each in made.descendants() if "src" in each.props)
+    assert (picture.props["src"], picture.props["alt"]) == ("data:b2", "title b")
+    assert [text for text in texts(made) if "caption" in text] == ["title a. caption a", "title b. caption b"]
+
+
+def test_margins_are_sent_with_their_words_and_whether_they_are_met(tab, monkeypatch):
+    sent = []
+    cards = elements.MarginCards()
+    monkeypatch.setattr(cards, "run_method", lambda *what: sent.append(what))
+    cards.show((link_view.Margin("a", 1.5, 2.0, sign="!"), link_view.Margin("b", 2.5, 2.0)))
+    assert sent == [
+        (
+            "show",
+            [
+                {"name": "a", "value": "+1.50 dB !", "needs": "needs 2 dB: MISSED", "met": False},
+                {"name": "b", "value": "+2.50 dB", "needs": "needs 2 dB: met", "met": True},
+            ],
+        )
+    ]
+
+
+def test_the_day_that_was_asked_for_is_shown_once_with_its_figures(session, days, monkeypatch):
+    shows = []
+    monkeypatch.setattr(day.day_view, "blocks", lambda study, sources: (study, sources))
+    monkeypatch.setattr(day, "drawn", lambda blocks: {"figure": blocks})
+    monkeypatch.setattr(days.told, "show_blocks", lambda *given: shows.append(given))
+    asyncio.run(days.look())
+    assert (shows, days.results.visible) == ([], False)
+    days.latest.state = State(session.draft.sha256, result=("study", "sources"))
+    asyncio.run(days.look())
+    asyncio.run(days.look())
+    assert shows == [(("study", "sources"), {"figure": ("study", "sources")})]
+    assert days.results.visible and "behind" not in days.results.classes
+    days.latest.state = State("another", result=("later", "sources"))
+    asyncio.run(days.look())
+    assert (len(shows), shows[1][0]) == (2, ("later", "sources"))
+    assert "behind" in days.results.classes
+
+
+def test_a_card_of_a_second_job_cancels_removes_and_goes_on_with_its_own(session, cards, asked, told, monkeypatch):
+    done = []
+    monkeypatch.setattr(session.jobs, "cancel", lambda number: done.append(("cancel", number)))
+    monkeypatch.setattr(session.jobs, "remove", lambda number: done.append(("remove", number)))
+    jobs = [
+        Job(n, session.folder, "done", "campaign", "t", ("campaign",), session.folder, (f"x{n}.ledger",))
+        for n in (1, 2)
+    ]
+    first, second = (shown(runs_jobs._Card(cards, job), job) for job in jobs)
+    second._cancel()
+    second._remove()
+    first._remove()
+    assert done == [("cancel", 2), ("remove", 2), ("remove", 1)]
+    (session.folder / "x2.html").touch()
+    asyncio.run(second._write_page())
+    asyncio.run(first._write_page())
+    assert [(order.kind, order.arguments) for order in asked.orders] == [
+        ("export", commands.campaign_report(Path("x2.ledger"), Path("x2-2.html")).arguments),
+        ("export", commands.campaign_report(Path("x1.ledger"), Path("x1.html")).arguments),
+    ]
+    assert told == []
+
+
+def test_a_result_in_a_folder_is_shown_by_its_name_and_opened_with_its_job(session, cards, monkeypatch):
+    opened = []
+    monkeypatch.setattr(cards, "open_page", lambda *where: opened.append(where))
+    (session.folder / "out").mkdir()
+    for name in ("report.html", "results.nc"):
+        (session.folder / "out" / name).touch()
+    results = ("out/none.html", "out/results.nc", "out/report.html")
+    job = Job(14, session.folder, "done", "study", "t", (), session.folder, results)
+    card = shown(runs_jobs._Card(cards, job), job)
+    assert texts(card.results) == [
+        "Save out/results.nc",
+        "Show report.html here",
+        "out/report.html in a tab of its own",
+    ]
+    links = [each.props["href"] for each in card.results.descendants() if isinstance(each, ui.link)]
+    assert links == ["/results/14/1", "/results/14/2"]
+    with card.results:
+        card._open_links(replace(job, number=15), 4, "sub/page.html")
+    (button,) = (each for each in card.results.descendants() if getattr(each, "text", "") == "Show page.html here")
+    for listener in button._event_listeners.values():
+        listener.handler(SimpleNamespace())
+    assert opened == [("/results/15/4", "15. sub/page.html")]
+
+
+def test_answers_and_responses_are_drawn_each_in_its_own_plot(session, tab, monkeypatch):
+    view = control.control_view
+    for name in ("sensitivity_plot", "gain_plot", "step_plot", "sine_plot", "jitter_plot", "motion_plot"):
+        monkeypatch.setattr(view, name, lambda of, name=name: (name, of))
+    monkeypatch.setattr(view, "drive_plot", lambda found, curves, over="ms": ("drive_plot", curves, over))
+    monkeypatch.setattr(view, "answer_words", lambda curves, what, seen: f"{what} of {curves} up to {seen}")
+    monkeypatch.setattr(view, "notes", lambda found: ("one", "two"))
+    page, shows = control.ControlPage(session), {}
+    for name, plot in page.plots.items():
+        monkeypatch.setattr(plot, "show", lambda figure, name=name: shows.update({name: figure}))
+    found = SimpleNamespace(field_of_view_rad=2.5)
+    page._controller(found)
+    answers = SimpleNamespace(step="step", sine="sine", jitter="jitter")
+    page._answers(found, answers)
+    assert shows == {
+        "sensitivity": ("sensitivity_plot", found),
+        "gain": ("gain_plot", found),
+        "step": ("step_plot", answers),
+        "step_drive": ("drive_plot", "step", "ms"),
+        "sine": ("sine_plot", answers),
+        "sine_drive": ("drive_plot", "sine", "ms"),
+        "jitter": ("jitter_plot", answers),
+        "motion": ("motion_plot", answers),
+        "jitter_drive": ("drive_plot", "jitter", view.SECONDS),
+    }
+    assert [each.text for each in (page.told_step, page.told_sine, page.told_jitter)] == [
+        "Error of step up to 2.5",
+        "Radial error of sine up to 2.5",
+        "Radial error of jitter up to 2.5",
+    ]
+    assert (texts(page.notes), page.shaken.visible) == (["one", "two"], True)
+    page._answers(found, SimpleNamespace(step="step", sine="sine", jitter={}))
+    assert not page.shaken.visible
+
+
+def test_the_budget_of_errors_is_looked_for_where_a_mission_has_one(session, tab, monkeypatch):
+    begun = []
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    monkeypatch.setattr(pointing.pointing_view, "blocks", lambda view: (Soft(view.words),))
+    page = pointing.PointingPage(session)
+    monkeypatch.setattr(
+        pointing, "background_tasks", SimpleNamespace(create_lazy=lambda task, name: begun.append(name) or task.close())
+    )
+    for table, words in ((None, "bare"), ("table", "with one")):
+        mission = SimpleNamespace(error_budget=table)
+        page.show_rest(SimpleNamespace(words=words, file=SimpleNamespace(mission=mission)))
+        assert (texts(page.told), page.errors.visible) == ([words], table is not None)
+    assert (page.state.text, len(begun), "behind" in page.budget.classes) == ("Computing ...", 1, True)
+
+
+def test_the_rows_of_sliders_stand_in_their_groups_with_the_seldom_moved_folded(session, tab):
+    tried = sliders.SliderBoard(None, None, link_view.second)
+    groups = link_view.sliders(session.draft)
+    tried.show(groups)
+    assert [*tried.rows] == [each.key for group in groups.values() for each in group]
+    assert [each.text for each in tried._box.descendants() if isinstance(each, ui.expansion)] == [
+        "Communication: 6 more",
+        "Beacon: 4 more",
+        "Answer: 4 more",
+        "Required: 1 more",
+    ]
+    folded = [
+        row.slider.key
+        for each in tried._box.descendants()
+        if isinstance(each, ui.expansion)
+        for row in each.descendants()
+        if isinstance(row, sliders.SliderRow)
+    ]
+    assert folded == [key for key in tried.rows if link_view.second(key)]
+    before = dict(tried.rows)
+    changed = link_view.sliders(session.draft.set(LEO, "6 cm"))
+    tried.show(changed)
+    assert tried.rows == before and tried.rows[LEO].typed == "6 cm"
+    tried.show({"Telescopes": groups["Telescopes"][:1]})
+    assert [*tried.rows] == [LEO]
+    assert tried.moved is None
+
+
+def test_of_two_sliders_that_are_moved_the_first_of_the_board_is_asked_for(session, tab, monkeypatch):
+    told = {}
+    board = sliders.SliderBoard(None, None)
+    board.show(link_view.sliders(session.draft))
+    for key, row in board.rows.items():
+        monkeypatch.setattr(row, "run_method", lambda name, new, key=key: told.setdefault(key, []).append(new))
+    other = "beacon.divergence"
+    board.rows[other]._begin("400 urad")
+    assert board.moved == (other, "400 urad")
+    board.rows[LEO]._begin("6 cm")
+    assert board.moved == (LEO, "6 cm")
+    board.faults({LEO: "too large", "none.such": "x"})
+    board.faults({LEO: "too large", other: "odd"})
+    board.faults({})
+    assert told == {LEO: [{"fault": "too large"}, {"fault": ""}], other: [{"fault": "odd"}, {"fault": ""}]}
+    row = board.rows[other]
+    assert row._turned(float(row.slider.steps)) == row.slider.at(row.slider.steps) == row.typed
+    assert told[other][-1] == {"text": row.typed}
