@@ -4,6 +4,7 @@ import asyncio
 import os
 import threading
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -831,3 +832,126 @@ def test_a_table_offers_the_keys_that_it_lacks_and_none_of_one_whose_name_begins
         drawn.reset_mock()
         mission_form.Form._more(SimpleNamespace(session=session, table=table, _add=None))
         assert [call.args[0] for call in drawn.select.call_args_list] == ([] if offered is None else [offered])
+
+
+# ------------------------------------------------------------------------------------------ behind the first of a kind
+def test_a_key_of_a_table_whose_name_begins_alike_is_counted_to_its_own(session):
+    text = "[orbit]\nx = 1\n[orbits]\ny = 1\nz = 2\n[orbit.leo]\nw = 3\n"
+    draft = session.draft.with_text(text)
+    found = mission_form.tables(draft)
+    assert [*found][:2] == ["orbit", "orbits"]
+    assert [mission_form.table_of(key) for key in ("orbit.leo.w", "orbits.y", "orbit", "name")] == [
+        "orbit",
+        "orbits",
+        "general",
+        "general",
+    ]
+    assert found["orbits"] == sum(f.key.split(".")[0] == "orbits" for f in draft.problems) > 0
+
+
+def test_rows_stand_under_the_heading_of_their_inner_table(session, opened):
+    page = opened()
+    with page.section:
+        page.form.show("orbit")
+    shown = [each.text for each in page.form._place.descendants() if each.tag == "h2"]
+    inner = [*dict.fromkeys(key.rpartition(".")[0] for key in page.form._rows)]
+    assert shown == [f"[{name}]" for name in inner] and len(shown) >= 3
+    assert [*page.form._rows] == [key for key in session.draft.values if key.startswith("orbit.")]
+    with page.section:
+        page.form.show(mission_form.ROOT)
+    assert [each.text for each in page.form._place.descendants() if each.tag == "h2"] == ["General"]
+
+
+def test_each_row_is_joined_to_its_own_label_and_note(opened):
+    page = opened()
+    rows = page.form._rows
+    places = range(len(rows))
+    assert [row.field.props["for"] for row in rows.values()] == [f"key-{n}" for n in places]
+    assert [row.note.props["id"] for row in rows.values()] == [f"note-{n}" for n in places]
+    labels = [each for each in page.form._place.descendants() if "mission-key" in each.classes]
+    assert [each.props["for"] for each in labels] == [f"key-{n}" for n in places]
+    assert [texts(each)[0] for each in labels] == [key.rpartition(".")[2] for key in rows]
+    assert [row.field.value for row in rows.values()] == [row.typed for row in rows.values()]
+
+
+def test_two_faults_of_a_row_are_told_behind_each_other_and_only_there(session, opened):
+    page = opened()
+    one, two = Fault(GEO, "x", 3, "reason one", "wanted one"), Fault(GEO, "y", 3, "reason two", "wanted two", "a.b")
+    values = session.draft.values
+    mission_form._judge(page.form._rows[GEO], replace(values[GEO], problems=(one, two)))
+    said = page.form._rows[GEO]
+    assert said.note.text == ("reason one; expected: wanted one reason two; did you mean a.b? expected: wanted two")
+    assert "wrong" in said.note.classes and "error" in said.field.props
+    assert "wrong" not in page.form._rows[LEO].note.classes
+    mission_form._judge(said, values[GEO])
+    assert "wrong" not in said.note.classes and "error" not in said.field.props
+    assert said.note.text == said.said == mission_form._explained(values[GEO])
+
+
+@pytest.mark.parametrize(
+    ("key", "line", "table", "revealed"),
+    [
+        (GEO, 17, "terminals", 17),
+        ("orbit", 0, "orbit", None),
+        ("orbit.leo.none", 5, "orbit", 5),
+        ("odd", 9, "general", 9),
+    ],
+)
+def test_a_fault_leads_to_its_table_and_its_line(session, opened, monkeypatch, key, line, table, revealed):
+    page = opened()
+    lines = []
+    monkeypatch.setattr(page.editor, "reveal_line", lines.append)
+    with page.section:
+        page._go(key, line)
+    assert page.form.table == table
+    assert lines[-1] == (
+        revealed or session.draft.values[next(k for k in session.draft.values if k[:6] == "orbit.")].line
+    )
+    marked = [name for name, (button, _) in page.entries.items() if "aria-current" in button.props]
+    assert marked == [table]
+
+
+def test_a_fault_is_listed_by_its_line_and_key_with_its_words(session, opened):
+    page = opened()
+    session.set(LEO, "5 parsec")
+    session.change(session.draft.with_text(session.draft.text.replace("[requirement]", "[requirements]")))
+    page._faults()
+    problems = session.draft.problems
+    places = [f"line {fault.line}: {fault.key}" if fault.line else fault.key for fault in problems]
+    assert [*buttons(page.faults)] == places and len(places) > 1
+    listed = texts(page.faults)
+    assert listed[0] == f"{len(problems)} faults to correct"
+    assert [text for text in listed if "; " in text] == [mission_form.fault_words(fault) for fault in problems]
+
+
+def test_pages_are_reached_by_links_of_which_the_present_one_is_marked(session):
+    entries = (("Mission", "/"), ("Runs", "/runs"), ("Run", "/run"))
+    client = Client(at("/"), request=None)
+    with client:
+        with layout.frame(session, "Run", entries):
+            layout.words("p", "the body")
+        links = [each for each in client.elements.values() if isinstance(each, ui.link)]
+        heads = [each.text for each in client.elements.values() if each.tag == "h1"]
+    assert [(each.text, each.props["href"]) for each in links] == [*entries]
+    assert [each.text for each in links if "aria-current" in each.props] == ["Run"]
+    assert heads == ["Run"]
+    client.delete()
+
+
+def test_a_page_is_brought_up_to_date_once_for_each_revision(monkeypatch):
+    looks, shows = [], []
+    monkeypatch.setattr(layout.ui, "timer", lambda every_s, look: looks.append((every_s, look)))
+    session = SimpleNamespace(disk="", revision=4)
+    mark = layout.follow(session, lambda: shows.append(session.revision))
+    ((every_s, look),) = looks
+    assert (every_s, shows) == (0.5, [4])
+    look()
+    session.revision = 5
+    look()
+    look()
+    session.revision = 7
+    mark()
+    look()
+    session.revision = 8
+    look()
+    assert shows == [4, 5, 8]

@@ -964,3 +964,155 @@ def test_a_reader_is_bounded_before_it_reads(monkeypatch, tmp_path):
     process.main()
     assert did == [("limit", {"cpu_s": 1}), "read"]
     assert json.loads(answer.read_text()) == {"x": 1}
+
+
+# -------------------------------------------------------------------------------------------- words with their numbers
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        (
+            UploadLimits(),
+            "has more than 200 MB; cut out the part that you need, keep every n-th sample, or run microrad",
+        ),
+        (UploadLimits(file_bytes=2_345_678), "has more than 2.346 MB; cut out the part that you need, keep every n-th"),
+    ],
+)
+def test_a_file_over_the_limit_is_told_with_the_limit_of_files(tmp_path, limits, words):
+    assert Uploads(tmp_path, limits).too_large("a\nb.csv").startswith(f"the file 'a\\u000ab.csv' {words}")
+
+
+def test_recordings_are_listed_by_their_age_and_then_by_their_key(tmp_path):
+    uploads = Uploads(tmp_path / "uploads", UploadLimits())
+    for key, name, at, size in (
+        ("b", "x.csv", 30, 3),
+        ("a", "y.csv", 20, 4),
+        ("d", "z.csv", 10, 5),
+        ("c", "w.csv", 20, 6),
+    ):
+        place = uploads.folder / (key * 16)
+        place.mkdir()
+        (place / name).write_bytes(bytes(size))
+        os.utime(place, (at, at))
+    assert [(each.key[0], each.name, each.size) for each in uploads.listed()] == [
+        ("d", "z.csv", 5),
+        ("a", "y.csv", 4),
+        ("c", "w.csv", 6),
+        ("b", "x.csv", 3),
+    ]
+    assert uploads._total() == 18
+    assert uploads.get("c" * 16).path == uploads.folder / ("c" * 16) / "w.csv"
+    uploads.remove("a" * 16)
+    assert [each.key[0] for each in uploads.listed()] == ["d", "c", "b"]
+
+
+def test_of_what_was_left_in_the_spool_the_old_goes_and_the_new_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", tempfile.gettempdir())
+    monkeypatch.setattr(recording_uploads.time, "time_ns", lambda: 10_000 * 10**9)
+    uploads = Uploads(tmp_path, LIMITS)
+    spool = tmp_path / "spool"
+    spool.mkdir()
+    for name, at_s in (("old", 6399), ("just", 6400), ("new", 9999)):
+        (spool / name).touch()
+        (spool / f"{name}.d").mkdir()
+        for each in (spool / name, spool / f"{name}.d"):
+            os.utime(each, (at_s, at_s))
+    uploads.hold_temporary_files()
+    assert sorted(path.name for path in spool.iterdir()) == ["just", "just.d", "new", "new.d"]
+    assert tempfile.tempdir == str(spool)
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (
+            -24,
+            "'a.csv' took more than 7 s of computing or too much memory to read; cut out the part of the recording",
+        ),
+        (-9, "'a.csv' took more than 7 s of computing or too much memory to read; cut out the part of the recording"),
+        (-11, "'a.csv' broke the program that reads it (code -11): it is damaged, or made to do so; copy it again."),
+        (1, "'a.csv' broke the program that reads it (code 1): it is damaged, or made to do so; copy it again."),
+    ],
+)
+@linux
+def test_a_reader_that_ended_is_told_by_how_it_ended(code, words):
+    assert reading._stopped("a.csv", code, ReadingLimits(cpu_s=7)).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("raised", "words"),
+    [
+        (process.RefusedError("no: " + "w" * 5000), "no: " + "w" * 3996),
+        (MemoryError(), "a.csv: reading it takes more than 2.5 GB of memory; cut out the part that you need."),
+        (KeyError("x"), "a.csv: this cannot be read (KeyError); copy it again from its source."),
+    ],
+)
+@pytest.mark.parametrize("task", ["channels", "view"])
+def test_what_a_reader_stumbles_over_is_refused_in_words(tmp_path, monkeypatch, raised, words, task):
+    def stumble(path, request):
+        assert (str(path), Path.cwd()) == ("a.csv", tmp_path)
+        raise raised
+
+    monkeypatch.chdir(Path(__file__).parent)
+    (tmp_path / "a.csv").write_text("1,2\n", "utf-8")
+    monkeypatch.setattr(process, task, stumble)
+    request = {"task": task, "name": "a.csv", "folder": str(tmp_path), "limits": {"memory_bytes": 2_500_000_000}}
+    assert process.answer_to(request) == {"refused": words}
+
+
+def test_a_second_channel_that_claims_too_much_is_refused_by_its_name(monkeypatch):
+    source = SimpleNamespace(names=["a", "b" * 300, "c"], samples=lambda: [3_000_000, 4_567_890, None])
+    monkeypatch.setattr("microrad.lab.recording.reader.open_source", lambda path: source)
+    with pytest.raises(process.RefusedError) as refusal:
+        process.opened(Path("x.npz"), {"limits": {"samples": 3_000_000}})
+    assert str(refusal.value) == (
+        f"x.npz: '{'b' * 200}' states 4.568e+06 samples, and at most 3e+06 are read here; cut out the part that you "
+        "need, or keep every n-th sample."
+    )
+    assert process.opened(Path("x.npz"), {"limits": {"samples": 4_567_890}}) is source
+
+
+def test_a_recording_of_several_channels_is_thinned_with_the_extremes_of_each(monkeypatch):
+    drive, output = np.zeros((1000, 2)), np.zeros((1000, 1))
+    drive[123, 0], drive[456, 1], output[789, 0] = 1.23456789, -2.5, 1e-9 / 3.0
+    found = SimpleNamespace(
+        drive=drive,
+        output=output,
+        samples=1000,
+        rate_hz=250.5,
+        findings=[SimpleNamespace(message=f"m{n}") for n in range(60)],
+    )
+    asked = []
+    monkeypatch.setattr(process, "opened", lambda path, request: None)
+    monkeypatch.setattr(
+        "microrad.lab.recording.read_recording", lambda *given, **more: asked.append((given, more)) or found
+    )
+    columns = {"inputs": [3, 4], "outputs": ["y"], "rate_hz": 250.5, "accept": ["drift"]}
+    seen = process.view(Path("a"), {"columns": columns, "limits": {"points": 20}})
+    assert asked == [((Path("a"), [3, 4], ["y"], 250.5), {"accept": ["drift"]})]
+    assert {123, 456, 789} <= set(seen["rows"]) and len(seen["rows"]) < 200
+    place = seen["rows"].index
+    assert seen["drive"][0][place(123)] == 1.234568
+    assert seen["drive"][1][place(456)] == -2.5
+    assert seen["output"][0][place(789)] == 3.333333e-10
+    assert (seen["samples"], seen["rate_hz"], len(seen["drive"]), len(seen["output"])) == (1000, 250.5, 2, 1)
+    assert seen["findings"] == [f"m{n}" for n in range(50)]
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("a/../.b", "its name holds a path"),
+        ("." + "x" * 170, "its name has more than 160 bytes"),
+        ("µ" * 81, "its name has more than 160 bytes"),
+        ("con.\t", "its name holds characters that do not print"),
+        (".con", "its name begins or ends with a dot or a blank"),
+        ("LPT¹.tar.gz", "its name is that of a device on Windows"),
+        ("  ", "it has no name"),
+    ],
+)
+def test_of_two_faults_of_a_name_the_first_is_told(name, fault):
+    with pytest.raises(NameRefusedError) as refusal:
+        safe_name(name)
+    assert str(refusal.value) == f"the file {names.shown(name)} is not taken: {fault}; rename it and drop it again"
+    typed = names.typed_words(refusal.value)
+    assert typed == f"the file {names.shown(name)} is not taken: {fault}; choose another name"
