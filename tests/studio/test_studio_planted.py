@@ -1,5 +1,8 @@
 """Jobs that this user did not queue: found in a working folder of a stranger's, and never started."""
 
+import errno
+import hashlib
+import hmac
 import io
 import json
 import os
@@ -403,3 +406,74 @@ def test_a_command_without_its_watcher_ends_with_all_that_it_has_started():
         command.stdin.close()
         assert command.wait(HANG_S) == -9
     assert gone(inner)
+
+
+# ------------------------------------------------------------------------------------------------ words for each fault
+@pytest.mark.skipif(os.name != "posix", reason="POSIX has links and modes of files")
+@pytest.mark.parametrize(
+    ("make", "number", "words"),
+    [
+        (lambda path: path.symlink_to("other"), errno.ELOOP, "it is a link"),
+        (lambda path: os.mkfifo(path, 0o600), errno.EINVAL, "it is no plain file"),
+        (lambda path: path.write_bytes(b"12345678"), errno.EFBIG, "it is larger than 7 bytes"),
+        (lambda path: None, errno.ENOENT, "No such file or directory"),
+    ],
+)
+def test_what_is_not_read_says_which_file_and_why(tmp_path, make, number, words):
+    path = tmp_path / "x"
+    make(path)
+    with pytest.raises(OSError, match=words) as fault:
+        plain_files.content(path, 7)
+    assert (fault.value.errno, fault.value.strerror, fault.value.filename) == (number, words, str(path))
+
+
+def test_a_file_of_just_so_many_bytes_is_read_whole(tmp_path):
+    (tmp_path / "x").write_bytes(b"1234567")
+    assert plain_files.content(tmp_path / "x", 7) == b"1234567"
+    plain_files.write_new(tmp_path / "y", b"a\n\xff")
+    assert plain_files.content(tmp_path / "y") == b"a\n\xff"
+    with pytest.raises(FileExistsError):
+        plain_files.write_new(tmp_path / "y", b"b")
+    assert plain_files.content(tmp_path / "y") == b"a\n\xff"
+
+
+@pytest.mark.parametrize(
+    ("system", "platform", "environment", "place"),
+    [
+        ("nt", "win32", {"LOCALAPPDATA": "/local", "XDG_STATE_HOME": "/state"}, "/local"),
+        ("posix", "darwin", {"LOCALAPPDATA": "/local", "XDG_STATE_HOME": "/state"}, "home/Library/Application Support"),
+        ("posix", "linux", {"LOCALAPPDATA": "/local", "XDG_STATE_HOME": "/state"}, "/state"),
+        ("posix", "linux", {"LOCALAPPDATA": "/local"}, "home/.local/state"),
+    ],
+)
+def test_each_system_keeps_the_key_in_its_own_place(monkeypatch, system, platform, environment, place):
+    monkeypatch.setattr(signing, "_home", lambda: Path("home"))
+    monkeypatch.setattr(signing, "os", SimpleNamespace(name=system, environ=environment))
+    monkeypatch.setattr(signing, "sys", SimpleNamespace(platform=platform))
+    assert signing.key_file() == Path(place) / "microrad" / "studio-key"
+
+
+@pytest.mark.parametrize(
+    ("error", "remedy"),
+    [
+        (PermissionError(errno.EACCES, "Permission denied"), "give XDG_STATE_HOME a folder that you may write to"),
+        (
+            OSError(errno.ELOOP, "it is a link"),
+            "remove it: the next job makes a new one, and jobs queued before are not started any more",
+        ),
+    ],
+)
+def test_a_key_that_cannot_be_read_says_why_and_what_to_do(own_key, monkeypatch, error, remedy):
+    def refuse(path):
+        raise error
+
+    monkeypatch.setattr(signing.plain_files, "opened", refuse)
+    with pytest.raises(signing.SigningError) as refusal:
+        signing.is_ours(b"text", "code")
+    assert str(refusal.value) == f"the studio's key {own_key} cannot be read: {error.strerror}; {remedy}"
+
+
+def test_the_code_of_a_text_is_that_of_the_key_and_of_its_purpose():
+    wanted = hmac.new(b"key", b"microrad studio job\0text", hashlib.sha256).hexdigest()
+    assert signing._code(b"key", b"text") == wanted
+    assert signing._code(b"kex", b"text") != wanted

@@ -26,7 +26,7 @@ from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.guard import signing
 from microrad.studio.guard.address import ExposureError
 from microrad.studio.guard.names import NameRefusedError
-from microrad.studio.jobs.queue import Order
+from microrad.studio.jobs.queue import Job, Order
 from microrad.studio.session import STUDIO, Session
 from shipped import DEFAULT, SHIPPED, links_alone
 from studio_jobs import written
@@ -520,7 +520,7 @@ WATCHED = """
 import os, sys
 from pathlib import Path
 from microrad.cli import main
-from microrad.studio.jobs.queue import Order
+from microrad.studio.jobs.queue import Job, Order
 from microrad.studio.session import Session
 
 notes = open(os.environ["NOTES"], "a", 1)
@@ -832,3 +832,48 @@ def test_a_studio_that_is_exposed_answers_under_that_name_alone(monkeypatch):
         entrance = server.listen(80, exposed)
         assert (entrance.names, entrance.listener) == (names, listener)
         assert entrance.url == f"http://{names[0]}/?token={entrance.token}"
+
+
+@pytest.mark.parametrize(
+    ("states", "words"),
+    [
+        ((), "the studio is closed"),
+        (("done", "lost"), "the studio is closed"),
+        (("running", "done"), "the studio is closed; 1 of its jobs goes on, and can be seen by starting it again"),
+        (
+            ("running", "done", "queued"),
+            "the studio is closed; 2 of its jobs go on, and can be seen by starting it again",
+        ),
+    ],
+)
+def test_a_studio_that_ends_says_how_many_jobs_go_on(call, folder, monkeypatch, states, words):
+    asked = []
+    listener = SimpleNamespace(close=lambda: asked.append("closed"))
+
+    def serve(session, entrance, on_ready):
+        monkeypatch.setattr(session.jobs, "listed", lambda: [Job(1, folder, state) for state in states])
+        asked.append((session.folder, session.draft.path.name, entrance))
+        raise KeyboardInterrupt
+
+    entrance = SimpleNamespace(listener=listener)
+    monkeypatch.setattr(server, "check_installed", lambda: None)
+    monkeypatch.setattr(server, "listen", lambda *where: asked.append(where) or entrance)
+    monkeypatch.setattr(server, "serve", serve)
+    (folder / "sub").mkdir()
+    (folder / "sub" / "m.toml").write_bytes(SHIPPED.read_bytes())
+    result = call("studio", "sub/m.toml", "--port", "8420", "--expose-to-network", "lab", "--no-browser")
+    assert (result.code, result.out) == (0, f"{words}\n")
+    assert asked == [(8420, "lab"), (folder / "sub", "m.toml", entrance), "closed"]
+
+
+def test_an_installation_that_lacks_libraries_names_each(monkeypatch):
+    for lacking, words in (({"nicegui", "uvicorn"}, "nicegui and uvicorn"), ({"uvicorn"}, "uvicorn")):
+        monkeypatch.setattr(server.util, "find_spec", lambda name, lacking=lacking: None if name in lacking else 1)
+        monkeypatch.setattr(server, "advice", lambda extra: f"with the extra {extra}")
+        with pytest.raises(server.StudioError) as refusal:
+            server.check_installed()
+        assert str(refusal.value) == (
+            f"the studio needs {words}, which this installation does not have; install it with the extra studio"
+        )
+    monkeypatch.setattr(server.util, "find_spec", lambda name: 1)
+    assert server.check_installed() is None
