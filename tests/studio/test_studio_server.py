@@ -520,7 +520,7 @@ WATCHED = """
 import os, sys
 from pathlib import Path
 from microrad.cli import main
-from microrad.studio.jobs.queue import Job, Order
+from microrad.studio.jobs.queue import Order
 from microrad.studio.session import Session
 
 notes = open(os.environ["NOTES"], "a", 1)
