@@ -1100,6 +1100,7 @@ def worst_case_of(**changes):
     ("changes", "said"),
     [
         ({}, []),
+        ({"corners_left_out": 1}, ["1 corner is no mirror and is left out."]),
         ({"corners_left_out": 2}, ["2 corners are no mirrors and are left out."]),
         (
             {"unstable_draws": 1},

@@ -45,3 +45,14 @@ def test_the_last_words_stand_below_each_other_on_a_narrow_terminal():
     assert pair.narrowed() == pair
     assert "source: paper" in table_text(wordy, 40)
     assert "source: paper" not in table_text(wordy, 140)
+
+
+@pytest.mark.parametrize(("width", "parts"), [(46, 1), (45, 2), (30, 2), (27, 3)])
+def test_numbers_that_a_terminal_has_no_room_for_stand_below_and_lose_no_digit(width, parts):
+    table = Table(
+        "tails", ("first", "one independent", "two", "independent samples"), [("PI", "7", "3", "35154")], (0, 3)
+    )
+    text = table_text(table, width)
+    assert len(table.parts(width)) == text.count("first") == text.count("PI") == parts
+    assert text.count("tails") == 1
+    assert {"7", "3", "35154", "independent", "samples", "one", "two"} <= set(text.split())

@@ -212,7 +212,7 @@ def test_a_check_that_raises_or_compares_nothing_is_trouble_and_one_without_its_
     assert not any(each.holds for each in found.values())
     v = findings.found([found["a"], found["b"]], WHOLE, full=False, domains={})
     assert not v.holds
-    assert page.headline(v) == "This installation does not hold: 1 checks did not run (a)."
+    assert page.headline(v) == "This installation does not hold: 1 check did not run (a)."
     assert "Not run: b. The record is not here." in page.summary(v)
     absent = findings.found([found["b"]], WHOLE, full=False, domains={})
     assert absent.holds

@@ -863,6 +863,7 @@ def test_the_report_of_a_ledger_goes_beside_a_page_that_is_there(session):
     [
         (Progress(37, 1600, "rows", 12.5), "2.3 %, 37 of 1600 rows; 12.5 a second, 2.08 min left"),
         (Progress(90, 120, "tuning LQG", 0.00625), "75 %, 90 of 120: tuning LQG; 0.00625 a second, 80 min left"),
+        (Progress(160, 1600, "rows", 1234.5), "10 %, 160 of 1600 rows; 1230 a second, 1.17 s left"),
         (Progress(1600, 1600, "rows", 234.7), "100 %, 1600 of 1600 rows; 235 a second, 0 s left"),
         (Progress(7, 0, "links"), "0 %, 7 of 0: links"),
     ],

@@ -796,6 +796,7 @@ def test_what_becomes_of_a_file_is_a_revision_once(file, change, seen):
         ('{"pid": 4711, "at": ""}', ", process 4711"),
         ('{"pid": "12"}', ", process 12"),
         ('{"pid": null}', ""),
+        ('{"pid": 1e999}', ""),
         ('{"at": 1}', ""),
         ("[1]", ""),
         ("{", ""),

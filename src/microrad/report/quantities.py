@@ -139,3 +139,13 @@ def duration(time_s: float) -> str:
         if abs(time_s) >= 2.0 * unit_s:
             return f"{time_s / unit_s:.3g} {unit}"
     return f"{time_s:.3g} s"
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: "1 parameter", "2 parameters".
+
+    Args:
+        number: how many.
+        noun: in the singular.
+    """
+    return f"{number} {noun}{'s' * (number != 1)}"

@@ -124,6 +124,18 @@ class Table:
                 found += max(map(len, texts)) + 3
         return found
 
+    def parts(self, width: int) -> list["Table"]:
+        """The table as tables that fit into so many columns of a terminal, each with the first column."""
+        shown = self.for_width(width)
+        kept, found = [0], []
+        for column in range(1, len(shown.headings)):
+            if len(kept) > 1 and shown.columns([*kept, column])._least() > width:
+                found.append(kept)
+                kept = [0]
+            kept.append(column)
+        first, *others = (shown.columns(each) for each in [*found, kept])
+        return [first, *(replace(each, title="") for each in others)]
+
     def narrowed(self) -> "Table":
         """The table with what a narrow terminal has room for: its last words below each other, with their headings."""
         return (self.columns(self.brief) if self.brief else self)._stacked()
@@ -156,9 +168,8 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
     from rich.table import Table as Drawn
 
     console = Console(file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False)
-    for each in tables:
-        shown = each.for_width(width)
-        table = Drawn(title=each.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for shown in (part for each in tables for part in each.parts(width)):
+        table = Drawn(title=shown.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
         for place, heading in enumerate(shown.headings):
             table.add_column(heading, overflow="fold", no_wrap=place not in shown.words)
         for row in shown.rows:

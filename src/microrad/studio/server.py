@@ -161,7 +161,7 @@ def alone(studio: Path) -> Iterator[None]:
 
 def _process(path: Path) -> str:
     """The process of the studio that has left a note, in words; nothing where the note cannot be read."""
-    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
+    with suppress(OSError, ValueError, OverflowError, LookupError, TypeError, RecursionError):
         return f", process {int(json.loads(plain_files.content(path))['pid'])}"
     return ""
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from microrad.campaign.records import CampaignSummary, CellSummary, Interval, OutputSummary, Sensitivity, Tail
+from microrad.core.units import format_quantity
 from microrad.report.campaign.numbers import bound, complement, ends, label, limit_text, share, share_ends, value
 from microrad.report.campaign.tables import good, index_text, ranked, unit_of
 from microrad.report.quantities import duration
@@ -245,7 +246,7 @@ def _sure(interval: Interval, name: str = "", unit: str = "rad") -> str:
 def progress_words(summary: CampaignSummary) -> str:
     """How far the campaign is, its pace and the time left."""
     p = summary.progress
-    pace = f"{p.rows_per_s:.3g} rows a second" if p.rows_per_s > 0.0 else ""
+    pace = format_quantity(p.rows_per_s, "rows a second", 3) if p.rows_per_s > 0.0 else ""
     if p.state == "complete":
         return ", ".join([f"Complete: {_rows(p.rows_done)} in {duration(p.seconds)}", *filter(None, [pace])]) + "."
     done = f"{p.rows_done} of {p.rows_total} rows" if p.rows_done <= p.rows_total else _rows(p.rows_done)

@@ -7,7 +7,7 @@ from typing import Any
 from microrad.core.units import format_quantity
 from microrad.loop.worst_case import InTime, WorstCase
 from microrad.report.fine_pointing.windows import index_name, index_text
-from microrad.report.quantities import angle, minus, percent, quantity
+from microrad.report.quantities import angle, counted, minus, percent, quantity
 from microrad.report.tables import Table, tables_text
 
 
@@ -59,7 +59,8 @@ def _change(share: float) -> str:
 def _unstable(found: WorstCase) -> list[str]:
     said = []
     if found.corners_left_out:
-        said.append(f"{found.corners_left_out} corners are no mirrors and are left out.")
+        are = "is no mirror and is" if found.corners_left_out == 1 else "are no mirrors and are"
+        said.append(f"{counted(found.corners_left_out, 'corner')} {are} left out.")
     if found.unstable_draws or found.unstable_corners:
         draws, corners = f"{found.unstable_draws} of the draws", f"{found.unstable_corners} of the corners"
         said.append(f"The loop is unstable on {draws} and on {corners}: no margin, and an error without bound.")

@@ -19,10 +19,10 @@ from microrad.report.identification import coupled_words as words
 from microrad.report.identification.coupled_figures import coupled_figures
 from microrad.report.identification.figures import VIRTUAL
 from microrad.report.identification.page import check_identification
-from microrad.report.identification.terminal import MOST_LINES, counted, warnings_text
+from microrad.report.identification.terminal import MOST_LINES, warnings_text
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import minus, quantity
+from microrad.report.quantities import counted, minus, quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
 

@@ -12,8 +12,7 @@ from microrad.lab.identify.coupled import Candidate, CoupledIdentification
 from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.lab.identify.linear.uncertainty import natural
 from microrad.report.identification.parameters import to_error, two_digits
-from microrad.report.identification.terminal import counted
-from microrad.report.quantities import minus, percent, quantity
+from microrad.report.quantities import counted, minus, percent, quantity
 
 USABLE = 0.5
 """Of the rms output: a model that leaves more on records that no fit has seen is none."""

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from textwrap import wrap
 
+from microrad.report.quantities import counted
+
 MOST_LINES = 23
 """Of a terminal of 25: the command has one of its own above them, and an empty one."""
 
@@ -33,13 +35,3 @@ def warnings_text(warnings: Sequence[str], refused: int, width: int, room: int) 
     more = [counted(left, "more warning")] if left else ["the whole of it"] if cut else []
     more += [counted(refused, "refused model")] if refused else []
     return "\n".join([*shown, *([f"- {' and '.join(more)}: see the report, or --json."] if more else [])])
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun: "1 parameter", "2 parameters".
-
-    Args:
-        number: how many.
-        noun: in the singular.
-    """
-    return f"{number} {noun}{'s' * (number != 1)}"

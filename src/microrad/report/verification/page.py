@@ -13,7 +13,7 @@ from microrad.core.units import format_quantity
 from microrad.report.data import finite
 from microrad.report.foundation import error_text
 from microrad.report.page.templates import page_of
-from microrad.report.quantities import minus, percent
+from microrad.report.quantities import counted, minus, percent
 from microrad.report.registry import Status
 from microrad.report.tables import Cell, Table
 from microrad.report.verification.check import Outcome
@@ -75,7 +75,7 @@ def headline(v: Verification) -> str:
     broken = [o.check.name for o in v.outcomes if o.trouble]
     if missed or broken:
         found = f"{missed} of {compared} comparisons are beyond their tolerance" if missed else ""
-        ran = f"{len(broken)} checks did not run ({', '.join(broken)})" if broken else ""
+        ran = f"{counted(len(broken), 'check')} did not run ({', '.join(broken)})" if broken else ""
         return f"This installation does not hold: {' and '.join(filter(None, (found, ran)))}."
     where = " in this installation" if v.integrity.whole else ", but this is not the recorded installation"
     absent = sum(bool(o.absent) for o in v.outcomes)

@@ -12,6 +12,7 @@ from importlib import resources
 from pathlib import Path
 
 from microrad.core.folder import read_bytes, write_whole
+from microrad.core.units import format_quantity
 from microrad.mission.toml import MAX_BYTES, scan
 from microrad.report.quantities import duration
 from microrad.studio.commands import Action, campaign_report, path_argument
@@ -120,7 +121,7 @@ def progress_words(progress: Progress | None) -> str:
     words = f"{_percent(progress.share)}, {progress.done} of {progress.total}{_what(progress)}"
     if progress.rate_1_s:
         left_s = (progress.total - progress.done) / progress.rate_1_s
-        words += f"; {progress.rate_1_s:.3g} a second, {duration(left_s)} left"
+        words += f"; {format_quantity(progress.rate_1_s, 'a second', 3)}, {duration(left_s)} left"
     return words
 
 
