@@ -295,3 +295,170 @@ def test_what_is_written_can_be_read_back(value, unit):
 def test_a_value_of_ten_digits_keeps_them_and_one_of_eleven_is_taken_as_computed():
     assert format_input(1.234567891e-6, "rad") == "1.234567891 µrad"
     assert format_input(1.2345678912e-6, "rad") == "1.235 µrad"
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: parse_quantity(("5 cm", 3), "m"),
+            UnitError,
+            ('a value of type tuple is not a quantity in quotes; expected a length with its unit, for example "5 m"'),
+        ),
+        (
+            lambda: parse_quantity("-12,75 dBm", "W"),
+            UnitError,
+            (
+                '"-12,75 dBm" has a comma: decimals take a point, thousands nothing; expected a power with '
+                'its unit, for example "-12.75 W"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("622.08", "bit/s"),
+            UnitError,
+            ('"622.08" is a number without a unit; expected a data rate with its unit, for example "622.08 Mbit/s"'),
+        ),
+        (
+            lambda: parse_quantity("622.08 Mbps", "bit/s"),
+            UnitError,
+            (
+                '"622.08 Mbps" has "Mbps", which is written Mbit/s here; expected a data rate with its '
+                'unit, for example "622.08 Mbit/s"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("-2.5 Hertz", "Hz"),
+            UnitError,
+            (
+                '"-2.5 Hertz" has "Hertz", which is written Hz here; expected a frequency with its unit, '
+                'for example "-2.5 Hz"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("0.5 microns", "m", "nm"),
+            UnitError,
+            (
+                '"0.5 microns" has "microns", which is written um here; expected a length with its unit, '
+                'for example "0.5 um"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("3.25 parsec", "m", "km"),
+            UnitError,
+            (
+                '"3.25 parsec" has "parsec" where a unit should stand: no unit is called "parsec"; '
+                'expected a length with its unit, for example "5 km"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("4e31 V s/rad", "V s/rad"),
+            UnitError,
+            (
+                '"4e31 V s/rad" is too large for a quantity; expected a voltage per angular rate with its '
+                'unit, for example "5 V s/mrad"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("-7e-33 V/rad", "V/rad"),
+            UnitError,
+            (
+                '"-7e-33 V/rad" is too small, and not 0, for a quantity; expected a voltage per angle with '
+                'its unit, for example "5 V/mrad"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("-1200.5 dBW", "W"),
+            UnitError,
+            '"-1200.5 dBW" is beyond 1000 dBW; expected a power with its unit, for example "5 W"',
+        ),
+        (
+            lambda: parse_quantity("2.5 mrad/s", "Hz"),
+            UnitError,
+            (
+                '"2.5 mrad/s" is in "mrad/s", another kind of quantity; expected a frequency with its '
+                'unit, for example "5 Hz"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("7" * 70 + " m", "m"),
+            UnitError,
+            (
+                '"777777777777777777777777777777777777777777777777777777777777…" has 72 characters, too '
+                'many for a quantity; expected a length with its unit, for example "5 m"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("1.5 m/s kg", "kg/s"),
+            UnitError,
+            (
+                '"1.5 m/s kg" has "m/s kg" where a unit should stand: put what stands below the stroke in '
+                'brackets, as in V/(mrad s); expected a quantity in kg/s with its unit, for example "5 '
+                'kg/s"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("2 A/", "A/W"),
+            UnitError,
+            (
+                '"2 A/" has "A/" where a unit should stand: a unit is missing beside a space or a stroke; '
+                'expected a responsivity with its unit, for example "5 A/W"'
+            ),
+        ),
+        (
+            lambda: parse_quantity("x 5 m\u200b", "rad/V"),
+            UnitError,
+            (
+                '"x 5 m\\u200b" does not begin with a plain number; expected an angle per voltage with its '
+                'unit, for example "5 mrad/V"'
+            ),
+        ),
+        (
+            lambda: parse_quantity(-4e17, "W/sr"),
+            UnitError,
+            ('-4e+17 is a number without a unit; expected a radiant intensity with its unit, for example "5 MW/sr"'),
+        ),
+    ],
+)
+def test_a_refusal_says_the_value_its_fault_what_is_wanted_and_an_example(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [format_quantity(622.08e6, "bit/s", digits) for digits in (2, 3, 5, 7)],
+            ["620 Mbit/s", "622 Mbit/s", "622.08 Mbit/s", "622.08 Mbit/s"],
+        ),
+        (
+            lambda: [
+                format_quantity(999.96e-9, "rad"),
+                format_quantity(999.94e-9, "rad"),
+                format_quantity(0.99996, "V"),
+            ],
+            ["1 µrad", "999.9 nrad", "1 V"],
+        ),
+        (
+            lambda: [
+                format_quantity(1234.5678, "m^2"),
+                format_quantity(0.0123456, "m"),
+                format_quantity(-7.25e-15, "W"),
+            ],
+            ["1235 m^2", "12.35 mm", "-0.00725 pW"],
+        ),
+        (
+            lambda: [format_quantity(-12.3456, "dB"), format_quantity(2.5e9, "V/(rad s)"), format_quantity(3.6e5, "K")],
+            ["-12.35 dB", "2500 MV/(rad s)", "360000 K"],
+        ),
+        (
+            lambda: [
+                format_input(each, "m") for each in (1064.2154e-9, 1.0 / 3.0, 12345.67891, -0.00012345678912, 0.0)
+            ],
+            ["1.0642154 µm", "333.3 mm", "12.34567891 km", "-123.5 µm", "0 m"],
+        ),
+    ],
+)
+def test_a_quantity_is_written_with_its_prefix_and_as_many_digits_as_it_takes(found, expected):
+    assert found() == expected

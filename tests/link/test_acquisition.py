@@ -26,7 +26,7 @@ from microrad.link.acquisition.sequence import (
     simulate_log,
     solve_sequence,
 )
-from microrad.link.acquisition.times import TimeDistribution
+from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
 from microrad.link.acquisition.trade import Beams, Receiver, wide_against_scan
 
 URAD = 1e-6
@@ -328,3 +328,276 @@ REFUSALS = [
 def test_what_no_acquisition_has_is_refused_with_the_limit(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: Stage("GEO detects", 2.5, 0.75, timeout_s=0.125),
+            ValueError,
+            ('the stage "GEO detects" lasts 2.5 s and its time-out is 125 ms: the time-out must not be shorter'),
+        ),
+        (
+            lambda: Stage(
+                "GEO turns", TimeDistribution(np.array([1.0, 4.5]), np.array([0.5, 0.25])), 0.5, timeout_s=3.25
+            ),
+            ValueError,
+            ('the stage "GEO turns" lasts 4.5 s and its time-out is 3.25 s: the time-out must not be shorter'),
+        ),
+        (
+            lambda: Stage("LEO locks", 1.5, 1.25),
+            ValueError,
+            ('the probability of success of the stage "LEO locks" is 1.25: it must be finite, above 0, at most 1'),
+        ),
+        (
+            lambda: Stage("LEO locks", -1.5),
+            ValueError,
+            'the duration of the stage "LEO locks" is -1.5 s: it must be finite, at least 0 s',
+        ),
+        (
+            lambda: Stage("LEO locks", 1.5, 0.5, timeout_s=math.inf),
+            ValueError,
+            'the time-out of the stage "LEO locks" is inf s: it must be finite, at least 0 s',
+        ),
+        (
+            lambda: solve_sequence((Stage("a", 1.0), Stage("b", 2.0, 0.5, on_failure="c"), Stage("c", 3.0)), 4),
+            ValueError,
+            '"b" goes back to "c" on failure: it must be itself or an earlier stage, one of a, b',
+        ),
+        (
+            lambda: solve_sequence((Stage("a", 1.0), Stage("b", 2.0), Stage("a", 3.0)), 4),
+            ValueError,
+            "two stages have the same name among a, b, a: name each differently",
+        ),
+        (lambda: solve_sequence((), 4), ValueError, "the sequence has no stage: give at least one"),
+        (
+            lambda: simulate((Stage("a", 1.0),), 2, 0, seed=5),
+            ValueError,
+            "the number of runs is 0: it must be finite, at least 1",
+        ),
+        (
+            lambda: frame_detection_probability(3.5, math.inf),
+            ValueError,
+            "the threshold is inf times the noise: it must be finite",
+        ),
+        (
+            lambda: frame_detection_probability(-3.5, 5.0),
+            ValueError,
+            "the signal-to-noise ratio is -3.5: it must be finite, at least 0",
+        ),
+        (
+            lambda: frames_detection_probability(0.25, 0),
+            ValueError,
+            "the number of frames is 0: it must be finite, at least 1",
+        ),
+        (
+            lambda: TimeDistribution(np.array([1.0, 3.0]), np.array([0.25, 0.375])).quantile(0.75),
+            ValueError,
+            ("no time has the probability 0.75: it must lie above 0 and be at most 0.625, the probability of success"),
+        ),
+        (
+            lambda: TimeDistribution(np.array([1.0, 3.0]), np.array([0.0, 0.0])).given_success(),
+            ValueError,
+            "there is no time of success: its probability is 0; lengthen the time-out or the coverage",
+        ),
+        (
+            lambda: wide_against_scan(
+                [2e-4, 3e-4], 0.9, Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.0), Receiver(0.05, 1e-10, 0.01)
+            ),
+            ValueError,
+            "the overlap is 0: it must be above 0, or a target between two tracks is seen for no time",
+        ),
+    ],
+)
+def test_a_refusal_of_times_and_stages_says_every_number_and_name(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+OTHER = replace(TIMING, range_m=39e6, body_settling_s=7.0, frame_time_s=0.25, frames=3, geo_response_s=1.75)
+UNLIKE = Chances(0.61, 0.83, 0.92, 0.87, 0.79, 0.94)
+TIMES = TimeDistribution(np.array([1.5, 4.0, 7.25]), np.array([0.125, 0.25, 0.375]))
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [each.success_probability for each in paper_sequence(OTHER, UNLIKE)],
+            [1.0, 1.0, 0.60700307, 1.0, 1.0, 0.8004, 1.0, 1.0, 0.7426, 1.0, 0.94],
+        ),
+        (
+            lambda: [each.longest_s for each in paper_sequence(OTHER, UNLIKE)],
+            [7.0, 0.130089997, 0.75, 1.75, 0.130089997, 0.5, 0.01, 0.130089997, 1.0, 0.130089997, 1.0],
+        ),
+        (
+            lambda: [each.failure_s for each in paper_sequence(OTHER, UNLIKE)],
+            [7.0, 0.130089997, 3.13009, 1.75, 0.130089997, 0.630089997, 0.01, 0.130089997, 1.13009, 0.130089997, 1.0],
+        ),
+        (
+            lambda: [
+                scan_stages(OTHER, TIMES, 9.5)[2].success_probability,
+                scan_stages(OTHER, TIMES, 9.5)[2].failure_s,
+                scan_stages(OTHER, TIMES, 9.5)[2].longest_s,
+            ],
+            [0.75, 11.88009, 7.25],
+        ),
+        (
+            lambda: [
+                scan_stages(OTHER, TIMES.scaled(1.5), 9.5)[2].success_probability,
+                scan_stages(OTHER, TIMES, 9.5)[0].longest_s,
+            ],
+            [1.0, 7.0],
+        ),
+        (
+            lambda: [
+                (o := solve_sequence(paper_sequence(OTHER, UNLIKE), 3)).success_probability,
+                o.lost.probability,
+                o.mean_time_s,
+                o.lost.mean_s,
+                o.locked.std_s,
+                o.locked.quantile(0.25),
+            ],
+            [0.79931752, 0.20068248, 17.2720886, 25.2967053, 6.04984526, 12.53036],
+        ),
+        (
+            lambda: [
+                (
+                    o := solve_sequence((Stage("a", TIMES, 0.5, 8.0), Stage("b", 2.5, 0.75, 3.5, "a")), 2)
+                ).success_probability,
+                *o.locked.time_s,
+                *o.locked.weight,
+                *o.lost.time_s,
+                *o.lost.weight,
+            ],
+            [
+                0.609375,
+                4.0,
+                6.5,
+                9.0,
+                9.75,
+                11.5,
+                12.0,
+                14.0,
+                14.5,
+                14.75,
+                17.25,
+                17.75,
+                20.5,
+                0.0625,
+                0.125,
+                0.00130208333,
+                0.1875,
+                0.00520833333,
+                0.03125,
+                0.00520833333,
+                0.0625,
+                0.0078125,
+                0.015625,
+                0.09375,
+                0.01171875,
+                10.0,
+                12.5,
+                13.0,
+                15.0,
+                15.5,
+                15.75,
+                16.0,
+                18.25,
+                18.75,
+                21.5,
+                0.000434027778,
+                0.00173611111,
+                0.0208333333,
+                0.00173611111,
+                0.0416666667,
+                0.00260416667,
+                0.25,
+                0.00520833333,
+                0.0625,
+                0.00390625,
+            ],
+        ),
+        (
+            lambda: [
+                TIMES.probability,
+                TIMES.mean_s,
+                TIMES.std_s,
+                TIMES.cumulative(4.0),
+                TIMES.quantile(0.3),
+                *TIMES.given_success().weight,
+                *TIMES.shifted(2.5).time_s,
+            ],
+            [0.75, 5.20833333, 2.20518644, 0.375, 4.0, 0.166666667, 0.333333333, 0.5, 4.0, 6.5, 9.75],
+        ),
+        (
+            lambda: [
+                *TIMES.followed_by(fixed_time(0.5, 0.75)).time_s,
+                *TIMES.followed_by(fixed_time(0.5, 0.75)).weight,
+            ],
+            [2.0, 4.5, 7.75, 0.09375, 0.1875, 0.28125],
+        ),
+        (
+            lambda: [
+                *joined([TIMES, fixed_time(4.0, 0.1), TIMES.shifted(2.5)]).time_s,
+                *joined([TIMES, fixed_time(4.0, 0.1), TIMES.shifted(2.5)]).weight,
+            ],
+            [1.5, 4.0, 6.5, 7.25, 9.75, 0.125, 0.475, 0.25, 0.375, 0.375],
+        ),
+        (
+            lambda: [frame_detection_probability(3.5, 5.25), frames_detection_probability(0.3, 4)],
+            [0.0400591569, 0.7599],
+        ),
+        (
+            lambda: [
+                Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.3).edge_irradiance_w_m2,
+                *Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.3).irradiance_w_m2([1e-5, 3e-5], [4e-6, 7e-6]),
+            ],
+            [4.84406672e-07, 4.33388283e-06, 5.94728905e-07],
+        ),
+        (
+            lambda: [*Receiver(0.05, 2e-10, 0.03, 0.002).detection_time_s([1e-10, 2e-10, 4e-10, 9e-10])],
+            [0.12, 0.03, 0.0075, 0.002],
+        ),
+        (
+            lambda: [
+                x
+                for name in (
+                    "radius_rad",
+                    "wide_full_angle_rad",
+                    "wide_time_s",
+                    "wide_probability",
+                    "scan_time_s",
+                    "scan_mean_time_s",
+                    "scan_probability",
+                )
+                for x in getattr(
+                    wide_against_scan(
+                        [9e-5, 5e-5], 0.9, Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.3), Receiver(0.05, 2e-10, 0.03, 0.002), 2e-6
+                    ),
+                    name,
+                )
+            ],
+            [
+                0.000193136942,
+                0.000107298301,
+                0.000546273767,
+                0.000303485426,
+                0.0554177387,
+                0.00527908652,
+                0.9,
+                0.9,
+                0.520936675,
+                0.160782925,
+                0.167188868,
+                0.0512877867,
+                0.852220953,
+                0.851600769,
+            ],
+        ),
+    ],
+)
+def test_times_chances_and_trades_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
