@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S
+from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S, place_m
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth import epoch, sun
@@ -822,3 +822,316 @@ def test_a_place_that_is_none_is_refused(site, words):
     with pytest.raises(OrbitError, match=words) as refused:
         station(*site)
     assert " of G is " in str(refused.value)
+
+
+SITE = earth.Station("site", -0.61, 1.93, 812.5, 0.17)
+TURNED = analytic.KeplerOrbit("turned", START, 9.1e6, 0.21, 1.93, 0.7, -1.1, 2.6, True)
+SEEN = np.array([[4.1e6, -5.3e6], [-3.3e6, 2.9e6], [5.2e6, -6.1e6]])
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (lambda: place_m(-0.61, 812.5), [5234245.41, -3633825.83]),
+        (
+            lambda: [*SITE.position(START, np.array([0.0, 3605.5])).position_m.ravel()],
+            [-1670831.16, -2902617.87, 4960408.07, 4355701.38, -3633825.83, -3633825.83],
+        ),
+        (
+            lambda: [
+                *SITE.position(START, np.array([0.0, 3605.5])).velocity_m_s[:2].ravel(),
+                *SITE.vertical(START, np.array([3605.5])).ravel(),
+            ],
+            [-361.718704, -317.622791, -121.838944, -211.662258, -0.454530652, 0.682073867, -0.57286746],
+        ),
+        (
+            lambda: [
+                *earth.elevation_rad(SITE, START, np.array([0.0, 3605.5]), SEEN),
+                *earth.GroundSite(SITE, START).above_mask(np.array([0.0, 3605.5]), SEEN),
+            ],
+            [-1.32170331, 0.4160993, -1.49170331, 0.2460993],
+        ),
+        (
+            lambda: [
+                *earth.subpoint(SEEN, np.array([0.4, 2.7])).latitude_rad,
+                *earth.subpoint(SEEN, np.array([0.4, 2.7])).longitude_rad,
+                *earth.subpoint(SEEN, np.array([0.4, 2.7])).height_m,
+            ],
+            [0.782259782, -0.792705008, -1.07770829, -0.0590750713, 1031096.88, 2218128.8],
+        ),
+        (
+            lambda: [*earth.gravity(SEEN, True).ravel(), *earth.gravity(SEEN, False).ravel()],
+            [
+                -4.02803621,
+                3.33372976,
+                3.24207792,
+                -1.82411629,
+                -5.12108169,
+                3.8438214,
+                -4.03519422,
+                3.33828975,
+                3.24783925,
+                -1.82661137,
+                -5.1178073,
+                3.84218254,
+            ],
+        ),
+        (
+            lambda: [
+                *earth.Earth("oblate", 123e3).clearance_rad(SEEN, -1.4 * SEEN[:, ::-1]),
+                *earth.Earth("sphere", 37e3).clearance_rad(SEEN, SEEN[::-1]),
+            ],
+            [1.37561607, 1.48181952, 0.832367975, 1.32201114],
+        ),
+        (
+            lambda: [*earth.Earth("oblate", 123e3).height_m(SEEN), *earth.Earth("sphere", 37e3).height_m(SEEN)],
+            [1031096.88, 2218128.8, 1020511.53, 2207315.81],
+        ),
+        (
+            lambda: [
+                *sun.sun_direction(START, np.array([0.0, 8.64e6])).ravel(),
+                *sun.shadow_rad(SEEN, sun.sun_direction(START, np.array([0.0, 8.64e6])), "oblate"),
+            ],
+            [
+                0.999998209,
+                -0.118768679,
+                -0.00173659842,
+                0.911016761,
+                -0.000752759179,
+                0.394895508,
+                -1.1254191,
+                -0.838394864,
+            ],
+        ),
+        (
+            lambda: [*TURNED.secular_rates_rad_s(), TURNED.mean_motion_rad_s],
+            [2.23212097e-07, -1.21323876e-07, 0.000727093298, 0.000727288632],
+        ),
+        (
+            lambda: [*TURNED.states(np.array([0.0, 5432.1])).position_m.ravel()],
+            [1570532.57, 3258812.66, -3623071.46, 4881298.36, 10074310.2, -4333496.75],
+        ),
+        (
+            lambda: [*TURNED.states(np.array([0.0, 5432.1])).velocity_m_s.ravel()],
+            [-4191.50211, 5579.39767, -3501.49256, 2010.20139, -59.6638823, 5499.05351],
+        ),
+        (
+            lambda: [
+                *dataclasses.replace(TURNED, j2=False).states(np.array([5432.1])).position_m.ravel(),
+                *dataclasses.replace(TURNED, j2=False).states(np.array([5432.1])).velocity_m_s.ravel(),
+            ],
+            [3276044.62, 4881220.93, -4321980.96, 5577.97188, 1992.63457, 5511.07955],
+        ),
+        (
+            lambda: [*analytic.eccentric_anomaly_rad(np.array([-9.0, -0.4, 0.0, 3.3, 20.0]), 0.63)],
+            [-9.16302671, -0.889262711, 0.0, 3.23883428, 20.6177638],
+        ),
+        (
+            lambda: [
+                *analytic.GeostationarySlot("slot", START, -2.2).states(np.array([98.7])).position_m[:2].ravel(),
+                *analytic.GeostationarySlot("slot", START, -2.2).states(np.array([98.7])).velocity_m_s[:2].ravel(),
+            ],
+            [-25728566.6, -33404461.7, 2435.89205, -1876.15688],
+        ),
+        (
+            lambda: [
+                analytic.sun_synchronous_inclination_rad(812e3, 0.07),
+                analytic.node_of_local_time(Epoch("2026-07-09T17:30:15Z"), 9.25),
+            ],
+            [1.72034834, 1.15920092],
+        ),
+        (
+            lambda: [
+                *Epoch("2026-07-09T17:30:15.5Z").julian_date,
+                Epoch("2008-12-31T23:00:00Z").seconds_to(Epoch("2017-01-01T01:00:00.25Z")),
+                float(START.terrestrial_centuries(np.array(1234.5))),
+            ],
+            [2461230.5, 0.729346065, 252468004.0, 0.262149626],
+        ),
+        (
+            lambda: [*START.earth_rotation_rad(np.array([-2e5, 0.0, 7654.3, 3e6]))],
+            [-8.33535259, 6.24887894, 6.80703936, 225.012354],
+        ),
+    ],
+)
+def test_places_times_and_states_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [START.utc(each) for each in (-0.0004, 59.9996, 3599.9994, 43200.0)],
+            [
+                "2026-03-20T12:00:00.000Z",
+                "2026-03-20T12:01:00.000Z",
+                "2026-03-20T12:59:59.999Z",
+                "2026-03-21T00:00:00.000Z",
+            ],
+        ),
+        (
+            lambda: [Epoch("2016-12-31T23:59:58.25Z").utc(each) for each in (1.7494, 1.75, 2.7494, 2.75, -86398.25)],
+            [
+                "2016-12-31T23:59:59.999Z",
+                "2016-12-31T23:59:60.000Z",
+                "2016-12-31T23:59:60.999Z",
+                "2017-01-01T00:00:00.000Z",
+                "2016-12-31T00:00:00.000Z",
+            ],
+        ),
+        (
+            lambda: [Epoch("2026-12-31T23:59:59.5Z").utc(each) for each in (0.4996, 1.0, 86400.0, 5097600.0)],
+            [
+                "2027-01-01T00:00:00.000Z",
+                "2027-01-01T00:00:00.500Z",
+                "2027-01-01T23:59:59.500Z",
+                "2027-02-28T23:59:59.500Z",
+            ],
+        ),
+        (
+            lambda: [
+                Epoch("2026-03-20T01:02Z").text,
+                Epoch("2026-03-20 01:02:03.10+0000").text,
+                Epoch("2026-03-20T01:02:00.000+00:00").text,
+            ],
+            ["2026-03-20T01:02:00Z", "2026-03-20T01:02:03.1Z", "2026-03-20T01:02:00Z"],
+        ),
+    ],
+)
+def test_instants_are_written_to_the_millisecond_over_minutes_days_and_leap_seconds(found, expected):
+    assert found() == expected
+
+
+PLACES = np.array([[RE + 3e5, RE + 2.5e5, RE + 7e4], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: earth.Earth("sphere", 80e3).clearance_rad(PLACES, PLACES + 1e6),
+            OrbitError,
+            (
+                "the first terminal (sample 2) is 9.87613 km below the surface that lines of sight must "
+                "clear, 80 km over the Earth; lower the grazing height or raise the orbit"
+            ),
+        ),
+        (
+            lambda: earth.Earth("oblate", 90.5e3).clearance_rad(PLACES + 1e6, PLACES[:, ::-1]),
+            OrbitError,
+            (
+                "the second terminal (sample 0) is 20.2132 km below the surface that lines of sight must "
+                "clear, 90.5 km over the Earth; lower the grazing height or raise the orbit"
+            ),
+        ),
+        (
+            lambda: sun.shadow_rad(PLACES * np.array([1.0, 0.875, 1.0]), np.array([[1.0], [0.0], [0.0]]), "sphere"),
+            OrbitError,
+            ("sample 1 is at 0.909297 Earth radii, inside the Earth, where there is no day or night; check the orbit"),
+        ),
+        (
+            lambda: analytic.KeplerOrbit("low", START, 7e6, 0.0925, 0.3, 0.4, 0.5, 0.6, True),
+            OrbitError,
+            (
+                "orbit low: its perigee is -25.637 km over the equator, below 120 km: it has decayed; "
+                "raise the altitude or the semi-major axis, or lower the eccentricity (a semi-major axis "
+                "counts from the centre of the Earth)"
+            ),
+        ),
+        (
+            lambda: analytic.KeplerOrbit("low", START, 7e6, 0.0125, -0.3, 0.4, 0.5, 0.6, True),
+            OrbitError,
+            (
+                "KeplerOrbit.inclination_rad of low is -17.19 deg: it must be finite, at least 0 deg, at "
+                "most 180 deg; an orbit against the rotation of the Earth has more than 90 deg"
+            ),
+        ),
+        (
+            lambda: LEO.states(np.array([0.0, math.inf])),
+            OrbitError,
+            "orbit LEO: a time is not a finite number of seconds; check the span",
+        ),
+        (
+            lambda: analytic.sun_synchronous_inclination_rad(6123.456e3),
+            OrbitError,
+            (
+                "no orbit 6123.46 km over the equator can be sun-synchronous: the flattening turns its "
+                "node too slowly; take an altitude below 5974 km"
+            ),
+        ),
+        (
+            lambda: analytic.node_of_local_time(START, 24.25),
+            OrbitError,
+            "a local time of 24.25 h is not from 0 to below 24; give hours, such as 10.5",
+        ),
+        (
+            lambda: START.utc(-1.7e9),
+            OrbitError,
+            (
+                "-1.7e+09 s after 2026-03-20T12:00:00Z is outside 1973-01-02 to 2050-12-31, the days for "
+                "which the rotation of the Earth (UT1) is tabulated or can be extrapolated; take an "
+                "instant between them"
+            ),
+        ),
+        (
+            lambda: START.utc(8.125e8),
+            OrbitError,
+            (
+                "8.125e+08 s after 2026-03-20T12:00:00Z is outside 1973-01-02 to 2050-12-31, the days for "
+                "which the rotation of the Earth (UT1) is tabulated or can be extrapolated; take an "
+                "instant between them"
+            ),
+        ),
+        (
+            lambda: START.utc(math.inf),
+            OrbitError,
+            "a time of inf s after 2026-03-20T12:00:00Z is not a number; give finite seconds",
+        ),
+        (
+            lambda: Epoch("2026-02-30T12:00:00Z"),
+            OrbitError,
+            (
+                "'2026-02-30T12:00:00Z' names no day of the calendar (day is out of range for month); "
+                'write the instant in UTC, for example "2026-03-20T12:00:00Z"'
+            ),
+        ),
+        (
+            lambda: Epoch("2026-03-20 12:00:00"),
+            OrbitError,
+            (
+                "'2026-03-20 12:00:00' has no time zone, so the instant is not known; write the instant in "
+                'UTC, for example "2026-03-20T12:00:00Z", with the Z'
+            ),
+        ),
+        (
+            lambda: Epoch("2015-12-31T23:59:60Z"),
+            OrbitError,
+            (
+                "'2015-12-31T23:59:60Z' names a leap second, but none was inserted on that day; write the "
+                'instant in UTC, for example "2026-03-20T12:00:00Z"'
+            ),
+        ),
+        (
+            lambda: Epoch("2016-12-31T24:00:00Z"),
+            OrbitError,
+            (
+                "'2016-12-31T24:00:00Z' names no time of the day (24 hours, 60 minutes, 60 seconds); write "
+                'the instant in UTC, for example "2026-03-20T12:00:00Z"'
+            ),
+        ),
+        (
+            lambda: Epoch("2051-01-02T03:04:05Z"),
+            OrbitError,
+            (
+                "'2051-01-02T03:04:05Z' is outside 1973-01-02 to 2050-12-31, the days for which the "
+                "rotation of the Earth (UT1) is tabulated or can be extrapolated; take an instant between "
+                "them"
+            ),
+        ),
+    ],
+)
+def test_a_refusal_of_orbits_and_places_says_every_number(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
