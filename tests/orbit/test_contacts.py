@@ -15,7 +15,7 @@ from microrad.core.earth import EARTH_RADIUS_M, FLATTENING, GEOSTATIONARY_RADIUS
 from microrad.mission.tables.pointing import point_ahead_rad
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth.figure import Earth, Station, elevation_rad, gravity
+from microrad.orbit.earth.figure import Earth, GroundSite, Station, elevation_rad, gravity
 from microrad.orbit.earth.sun import shadow_rad, sun_direction
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.visibility import contacts as visible
@@ -28,9 +28,11 @@ from microrad.orbit.visibility.contacts import (
     contacts_with_each,
     coplanar_contact,
     passes,
+    station_range,
 )
 from microrad.orbit.visibility.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.visibility.line_of_sight import sight
+from microrad.orbit.visibility.stations import StationRows, pass_spans
 
 DAY = (0.0, 86400.0)
 WEEK = (0.0, 7.0 * 86400.0)
@@ -849,3 +851,476 @@ def test_the_suns_greatest_declination_is_the_obliquity_of_its_date(year):
     sun = sun_direction(Epoch(f"{year}-06-18T00:00:00Z"), np.arange(0.0, 7 * 86400.0, 600.0))
     highest = math.degrees(math.asin(float(np.max(sun[2]))))
     assert highest == pytest.approx(23.43928 - 0.013004 * (year + 0.47 - 2000) / 100, abs=2e-3)
+
+
+TILTED = KeplerOrbit("tilted", EPOCH, 8.3e6, 0.11, 1.13, 0.9, -0.7, 2.2, True)
+HELD = Terminal(TILTED, Limits("nadir", (0.2, -0.1, 0.9), 1.1, 2.5e-3, 0.35, False), "held")
+AIMED = Terminal(
+    GeostationarySlot("slot", EPOCH, 0.8), Limits("sun", (0.3, 0.5, 2.0), 1.9, math.inf, 0.2, True), "aimed"
+)
+SITES = (Station("north", 1.09, 0.35, 420.0, 0.12), Station("south", -0.72, 2.9, 1310.0, 0.06))
+WHILE = (1800.0, 30_000.0)
+
+
+def told(found):
+    return [x for each in found for x in (each.start_s, each.end_s)]
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: told(contacts(HELD, AIMED, FLAT, EPOCH, WHILE)),
+            [
+                3595.30899,
+                4007.70577,
+                8613.9833,
+                8787.16293,
+                11349.8811,
+                11668.4294,
+                17429.2947,
+                17881.8705,
+                19122.8952,
+                19313.4143,
+            ],
+        ),
+        (
+            lambda: told(contacts(AIMED, HELD, ROUND, EPOCH, WHILE)),
+            [
+                3569.11716,
+                4007.70577,
+                8613.9833,
+                8818.38561,
+                11315.3027,
+                11668.4294,
+                17429.2947,
+                17998.22,
+                19009.4484,
+                19313.4143,
+            ],
+        ),
+        (
+            lambda: told(
+                contacts_with_each(free(TILTED), (AIMED, free(SLOT)), FLAT, EPOCH, WHILE, furthest_m=4.1e7)[1]
+            ),
+            [4151.40672, 7014.26743, 11921.456, 14854.6368, 19838.5773, 22790.6229, 28462.2984, 30000.0],
+        ),
+        (
+            lambda: told(
+                contacts_with_each(
+                    free(TILTED),
+                    (AIMED, free(GroundSite(SITES[1], EPOCH)), free(SLOT)),
+                    FLAT,
+                    EPOCH,
+                    WHILE,
+                    furthest_m=5.5e6,
+                )[1]
+            ),
+            [10043.5031, 10804.6173, 17293.8703, 18789.3837, 25089.4202, 26543.4897],
+        ),
+        (
+            lambda: told(passes(TILTED, SITES[0], EPOCH, WHILE)),
+            [6315.74338, 7397.08677, 13755.6482, 15259.806, 21432.6856, 23133.1397, 29222.225, 30000.0],
+        ),
+        (
+            lambda: [
+                x
+                for each in passes(TILTED, SITES[1], EPOCH, WHILE)
+                for x in (each.duration_s, each.highest_rad, each.highest_s)
+            ],
+            [
+                819.092571,
+                0.145687232,
+                10423.7314,
+                1581.97225,
+                0.895847258,
+                18139.1151,
+                1484.07332,
+                0.865338407,
+                25937.4633,
+            ],
+        ),
+        (
+            lambda: [*station_range(TILTED, SITES[1], EPOCH)(np.array([0.0, 4321.0])), coarse_step_s(TILTED, 500.0)],
+            [12256243.4, 8820711.16, 60.0],
+        ),
+        (
+            lambda: [
+                x
+                for each in pass_spans(TILTED, StationRows.of(SITES, EPOCH), WHILE, 60.0, (9e6, 6e6))
+                for x in each.ravel()
+            ],
+            [
+                6315.74338,
+                7397.08677,
+                13755.6482,
+                15259.806,
+                21432.6856,
+                23133.1397,
+                29222.225,
+                30000.0,
+                9985.52472,
+                10804.6173,
+                17207.4114,
+                18789.3837,
+                25059.4164,
+                26543.4897,
+            ],
+        ),
+        (
+            lambda: [
+                x for each in pass_spans(TILTED, StationRows.of(SITES[::-1], EPOCH), WHILE, 60.0) for x in each.ravel()
+            ],
+            [
+                9985.52472,
+                10804.6173,
+                17207.4114,
+                18789.3837,
+                25059.4164,
+                26543.4897,
+                6315.74338,
+                7397.08677,
+                13755.6482,
+                15259.806,
+                21432.6856,
+                23133.1397,
+                29222.225,
+                30000.0,
+            ],
+        ),
+        (
+            lambda: [
+                x
+                for each in StationRows.of(SITES, EPOCH).lines(
+                    np.array([0.3, 1.9]), np.array([1, 0]), np.array([[7e6, -2e6], [3e6, 5e6], [-1e6, 4e6]])
+                )
+                for x in each
+            ],
+            [-11096097.5, -434965.172, 6074377.37, 3127017.92],
+        ),
+        (
+            lambda: [
+                *(s := sight(TILTED, SLOT, [100.0, 2500.0])).range_m,
+                *s.range_rate_m_s,
+                *s.rate_rad_s,
+                *s.acceleration_rad_s2,
+                *s.transverse_velocity_m_s,
+                *s.point_ahead_rad,
+                *s.direction.ravel(),
+            ],
+            [
+                46308473.5,
+                49620628.3,
+                4528.82481,
+                -2531.6889,
+                0.000158930609,
+                0.000148766765,
+                8.10829846e-08,
+                3.71848881e-08,
+                7359.83388,
+                7381.90037,
+                4.90995266e-05,
+                4.92467383e-05,
+                0.960201918,
+                0.857108172,
+                0.219750545,
+                0.513541046,
+                -0.172400622,
+                0.0405114283,
+            ],
+        ),
+        (
+            lambda: [
+                *sight(TILTED, SLOT, 100.0).doppler_hz(1.55e-6),
+                *coplanar_contact(8.3e6, 123e3),
+                coplanar_contact(8.3e6, 123e3).visible_share,
+            ],
+            [-2921822460.0, 5477.29148, 8245.51932, 33864169.6, 46819924.8, 0.664274895],
+        ),
+        (
+            lambda: [
+                *(side := limits.Side(HELD, AIMED, FLAT, EPOCH)).field_of_regard(np.array([100.0, 2500.0])),
+                *side.slew(np.array([100.0, 2500.0])),
+                *side.off_sun(np.array([100.0, 2500.0])),
+                *side.shadow(np.array([100.0, 2500.0])),
+                *side.in_body(np.array([100.0, 2500.0])).ravel(),
+            ],
+            [
+                -0.248347833,
+                0.535684781,
+                0.935170994,
+                0.942796836,
+                0.182999856,
+                0.366163657,
+                -0.338658578,
+                -0.217376845,
+                -0.90947229,
+                0.194102552,
+                -0.107358058,
+                0.0366565641,
+                0.401664538,
+                0.980296127,
+            ],
+        ),
+        (
+            lambda: [
+                *(side := limits.Side(AIMED, HELD, FLAT, EPOCH)).field_of_regard(np.array([100.0, 2500.0])),
+                *side.off_sun(np.array([100.0, 2500.0])),
+                *side.in_body(np.array([100.0, 2500.0])).ravel(),
+            ],
+            [
+                0.861403056,
+                1.01696971,
+                1.73643943,
+                1.55327563,
+                -0.756372857,
+                -0.573209056,
+                0.177509122,
+                -0.0396335217,
+                0.629595595,
+                0.818450098,
+            ],
+        ),
+        (
+            lambda: [
+                x
+                for _, spans in limits.conditions(limits.Side(HELD, AIMED, FLAT, EPOCH), np.arange(0.0, 18000.0, 60.0))
+                for x in spans.ravel()
+            ],
+            [
+                544.328147,
+                4007.70577,
+                8613.9833,
+                11668.4294,
+                17429.2947,
+                17940.0,
+                0.0,
+                17940.0,
+                0.0,
+                17940.0,
+                0.0,
+                17940.0,
+            ],
+        ),
+        (
+            lambda: [
+                *limits.body_rate_rad_s(
+                    "nadir", TILTED.states(np.array([77.0])), sun_direction(EPOCH, np.array([77.0]))
+                ).ravel(),
+                *limits.body_rate_rad_s(
+                    "sun", TILTED.states(np.array([77.0])), sun_direction(EPOCH, np.array([77.0]))
+                ).ravel(),
+            ],
+            [0.000507015842, -0.000402331377, 0.000304797202, 0.000618027507, -1.0645023e-06, -4.61427274e-07],
+        ),
+        (
+            lambda: [
+                *events.complement(np.array([[-3.0, 2.5], [4.0, 6.25], [8.0, 99.0]]), (1.0, 9.0)).ravel(),
+                *events.union(np.array([[1.0, 4.0], [9.0, 11.0]]), np.array([[3.5, 6.0]])).ravel(),
+                *events.intersection(np.array([[1.0, 4.0], [9.0, 11.0]]), np.array([[3.5, 9.75]])).ravel(),
+            ],
+            [2.5, 4.0, 6.25, 8.0, 1.0, 6.0, 9.0, 11.0, 3.5, 4.0, 9.0, 9.75],
+        ),
+    ],
+)
+def test_contacts_passes_and_sights_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [(c.begins, c.ends) for c in contacts(HELD, AIMED, FLAT, EPOCH, WHILE)],
+            [
+                ["Earth", "field of regard of held"],
+                ["field of regard of held", "Earth"],
+                ["Earth", "field of regard of held"],
+                ["field of regard of held", "Earth"],
+                ["Earth", "field of regard of held"],
+            ],
+        ),
+        (
+            lambda: [(c.begins, c.ends) for c in contacts(AIMED, HELD, ROUND, EPOCH, (3700.0, 9000.0))],
+            [["start of the span", "field of regard of held"], ["field of regard of held", "Earth"]],
+        ),
+        (
+            lambda: [
+                (c.begins, c.ends)
+                for c in contacts_with_each(
+                    free(TILTED), (AIMED, free(GroundSite(SITES[1], EPOCH))), FLAT, EPOCH, WHILE, furthest_m=5.5e6
+                )[1]
+            ],
+            [
+                ["range", "elevation mask of south"],
+                ["range", "elevation mask of south"],
+                ["range", "elevation mask of south"],
+            ],
+        ),
+        (
+            lambda: [
+                (c.begins, c.ends)
+                for c in contacts_with_each(free(TILTED), (AIMED, free(SLOT)), FLAT, EPOCH, WHILE, furthest_m=4.1e7)[1]
+            ],
+            [["range", "range"], ["range", "range"], ["range", "range"], ["range", "end of the span"]],
+        ),
+        (
+            lambda: [(c.begins, c.ends) for c in passes(TILTED, SITES[0], EPOCH, (7000.0, 30_000.0))],
+            [
+                ["start of the span", "elevation mask of north"],
+                ["elevation mask of north", "elevation mask of north"],
+                ["elevation mask of north", "elevation mask of north"],
+                ["elevation mask of north", "end of the span"],
+            ],
+        ),
+        (
+            lambda: [
+                cause
+                for each in (HELD, AIMED)
+                for cause, _ in limits.conditions(
+                    limits.Side(each, free(SLOT), FLAT, EPOCH), np.arange(0.0, 9000.0, 60.0)
+                )
+            ],
+            [
+                "field of regard of held",
+                "slew limit of held",
+                "Sun near the line of sight of held",
+                "eclipse of held",
+                "field of regard of aimed",
+                "Sun near the line of sight of aimed",
+            ],
+        ),
+        (
+            lambda: [
+                visible.hidden_by(free(TILTED), free(GroundSite(SITES[0], EPOCH))),
+                visible.hidden_by(HELD, AIMED),
+            ],
+            ["elevation mask of north", "Earth"],
+        ),
+    ],
+)
+def test_each_end_of_a_contact_names_the_limit_of_its_own_terminal(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: coarse_times((12.5, -3.25), 60.0),
+            OrbitError,
+            "the span from 12.5 s to -3.25 s holds no time; give a start and a later end",
+        ),
+        (
+            lambda: coarse_times((0.0, 8.64e7), 7.5),
+            OrbitError,
+            (
+                "the span from 0 s to 8.64e+07 s would be searched in steps of 7.5 s, more than 5e+06 of "
+                "them; give a shorter span, or check the velocities of the orbits"
+            ),
+        ),
+        (
+            lambda: coarse_step_s(
+                SimpleNamespace(
+                    name="X",
+                    states=lambda time_s: States(np.array([[7e6], [0.0], [0.0]]), np.array([[3.0], [0.0], [0.0]])),
+                ),
+                12.5,
+            ),
+            OrbitError,
+            (
+                "X: the state at 12.5 s moves straight to or from the Earth's centre, or is no number; "
+                "check its velocity"
+            ),
+        ),
+        (
+            lambda: events.positive(np.sin, np.array([3.0, 2.0, 5.0])),
+            OrbitError,
+            "the times of the samples do not rise; sort them, each once",
+        ),
+        (
+            lambda: events.positive_rows(
+                lambda t, row: t, np.array([1.0, 2.5, 4.0]), np.array([[1.0, 2.0, 3.0], [1.0, math.inf, 3.0]])
+            ),
+            OrbitError,
+            "a function whose sign is asked for is not finite at 2.5 s; check the orbits there",
+        ),
+        (
+            lambda: events.positive_rows(lambda t, row: t, np.array([1.0, 2.5]), np.ones((3, 2))),
+            OrbitError,
+            "(3, 2) values at 2 times; give as many values as times, at least 3",
+        ),
+        (
+            lambda: contacts_with_each(HELD, (AIMED, Terminal(SLOT, UNLIMITED, "held")), FLAT, EPOCH, WHILE),
+            OrbitError,
+            'two terminals are called "held"; give each a name of its own',
+        ),
+        (
+            lambda: contacts_with_each(
+                HELD,
+                (AIMED, Terminal(circular("low", EPOCH, 130e3, 0.3, 0.1, 0.2, False), UNLIMITED, "low one")),
+                Earth("sphere", 150.5e3),
+                EPOCH,
+                WHILE,
+            ),
+            OrbitError,
+            (
+                "low one is 130.000 km over the Earth at 11640 s, not above the 150.5 km that lines of "
+                "sight must clear; lower orbit.grazing_height, or raise the orbit"
+            ),
+        ),
+        (
+            lambda: coplanar_contact(6.4e6, 123e3),
+            OrbitError,
+            (
+                "an orbit of radius 6400 km is not between the surface to clear, 6501 km, and the "
+                "geostationary 42160 km; give a radius between"
+            ),
+        ),
+        (
+            lambda: sight(TILTED, SLOT, 0.0).doppler_hz(-1.55e-6),
+            OrbitError,
+            "a wavelength of -1.55 µm is none; give one above 0 m",
+        ),
+        (
+            lambda: Limits("inertial", (0.0, 0.0, 1.0), 1.0, 1.0, 0.1, True),
+            OrbitError,
+            "the attitude 'inertial' is not known; write nadir, sun or free",
+        ),
+        (
+            lambda: Limits("nadir", (0.0, 0.0, 0.0), 1.0, 1.0, 0.1, True),
+            OrbitError,
+            "the boresight (0.0, 0.0, 0.0) has no direction; give three numbers, such as (0, 0, 1)",
+        ),
+        (
+            lambda: Limits("nadir", (0.0, 1.0), 1.0, 1.0, 0.1, True),
+            OrbitError,
+            "the boresight (0.0, 1.0) has no direction; give three numbers, such as (0, 0, 1)",
+        ),
+        (
+            lambda: Limits("nadir", (0.0, 0.0, 1.0), 3.5, 1.0, 0.1, True),
+            OrbitError,
+            (
+                "Limits.field_of_regard_rad is 200.5 deg: it must be finite, above 0 deg, at most 180 deg; "
+                "it is a half angle"
+            ),
+        ),
+        (
+            lambda: Limits("sun", (0.0, 0.0, 1.0), 1.0, -0.0125, 0.1, True),
+            OrbitError,
+            "a slew limit of -12.5 mrad/s is not above 0",
+        ),
+        (
+            lambda: Limits("free", (0.0, 0.0, 1.0), 1.0, 1.0, 0.1, True),
+            OrbitError,
+            (
+                'a field of regard means nothing with the attitude "free": the body turns its boresight '
+                'onto the partner; leave it out, or hold the body "nadir" or "sun"'
+            ),
+        ),
+    ],
+)
+def test_a_refusal_of_a_search_says_its_names_times_and_remedy(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
