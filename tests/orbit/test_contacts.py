@@ -1133,16 +1133,16 @@ def test_contacts_passes_and_sights_of_numbers_unlike_each_other(found, expected
         (
             lambda: [(c.begins, c.ends) for c in contacts(HELD, AIMED, FLAT, EPOCH, WHILE)],
             [
-                ["Earth", "field of regard of held"],
-                ["field of regard of held", "Earth"],
-                ["Earth", "field of regard of held"],
-                ["field of regard of held", "Earth"],
-                ["Earth", "field of regard of held"],
+                ("Earth", "field of regard of held"),
+                ("field of regard of held", "Earth"),
+                ("Earth", "field of regard of held"),
+                ("field of regard of held", "Earth"),
+                ("Earth", "field of regard of held"),
             ],
         ),
         (
             lambda: [(c.begins, c.ends) for c in contacts(AIMED, HELD, ROUND, EPOCH, (3700.0, 9000.0))],
-            [["start of the span", "field of regard of held"], ["field of regard of held", "Earth"]],
+            [("start of the span", "field of regard of held"), ("field of regard of held", "Earth")],
         ),
         (
             lambda: [
@@ -1152,9 +1152,9 @@ def test_contacts_passes_and_sights_of_numbers_unlike_each_other(found, expected
                 )[1]
             ],
             [
-                ["range", "elevation mask of south"],
-                ["range", "elevation mask of south"],
-                ["range", "elevation mask of south"],
+                ("range", "elevation mask of south"),
+                ("range", "elevation mask of south"),
+                ("range", "elevation mask of south"),
             ],
         ),
         (
@@ -1162,15 +1162,15 @@ def test_contacts_passes_and_sights_of_numbers_unlike_each_other(found, expected
                 (c.begins, c.ends)
                 for c in contacts_with_each(free(TILTED), (AIMED, free(SLOT)), FLAT, EPOCH, WHILE, furthest_m=4.1e7)[1]
             ],
-            [["range", "range"], ["range", "range"], ["range", "range"], ["range", "end of the span"]],
+            [("range", "range"), ("range", "range"), ("range", "range"), ("range", "end of the span")],
         ),
         (
             lambda: [(c.begins, c.ends) for c in passes(TILTED, SITES[0], EPOCH, (7000.0, 30_000.0))],
             [
-                ["start of the span", "elevation mask of north"],
-                ["elevation mask of north", "elevation mask of north"],
-                ["elevation mask of north", "elevation mask of north"],
-                ["elevation mask of north", "end of the span"],
+                ("start of the span", "elevation mask of north"),
+                ("elevation mask of north", "elevation mask of north"),
+                ("elevation mask of north", "elevation mask of north"),
+                ("elevation mask of north", "end of the span"),
             ],
         ),
         (
