@@ -565,3 +565,258 @@ def test_the_largest_rate_that_ion_keeps_is_taken():
 def test_the_light_time_of_a_whole_light_second_is_that_second():
     for range_m, light_s in ((299_792_458.0, 1), (299_792_459.0, 2), (1.0, 1)):
         assert read_plan(plan_of([planned(range_max_m=range_m)]))[2][0][4] == light_s
+
+
+UNLIKE = Service(np.array([3.0, 8.0, 15.0, 31.0]), np.array([7.0, 2.0, 12.0]), 0.625)
+LATER = Service(np.array([36.0, 41.0, 47.0]), np.array([0.5, 4.0]), 0.75)
+KEPT = deliver(3.5, (2.0, 40.0), 25.0, [UNLIKE, LATER], (-1.0, 52.0), 0.125)
+WAITED = Latency(np.array([9.0, 2.0, 5.0]), np.array([4.0, 2.0, 12.0]), np.array([3.0, 1.0, 8.0]), 4.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [
+                *UNLIKE.within(5.0, 20.0).edges_s,
+                *UNLIKE.within(5.0, 20.0).rate_bit_s,
+                UNLIKE.within(5.0, 20.0).capacity_bit,
+            ],
+            [5.0, 8.0, 15.0, 20.0, 7.0, 2.0, 12.0, 59.375],
+        ),
+        (
+            lambda: [
+                *UNLIKE.within(-2.0, 8.0).edges_s,
+                *UNLIKE.within(-2.0, 8.0).rate_bit_s,
+                UNLIKE.within(15.0, 99.0).capacity_bit,
+            ],
+            [3.0, 8.0, 7.0, 120.0],
+        ),
+        (
+            lambda: [
+                *UNLIKE.within(9.0, 14.0).edges_s,
+                *UNLIKE.within(9.0, 14.0).rate_bit_s,
+                UNLIKE.within(9.0, 14.0).availability,
+            ],
+            [9.0, 14.0, 2.0, 0.625],
+        ),
+        (
+            lambda: [
+                *UNLIKE.locked_at(9.5).edges_s,
+                *UNLIKE.locked_at(9.5).mean_rate_bit_s,
+                UNLIKE.locked_at(9.5).capacity_bit,
+            ],
+            [3.0, 9.5, 15.0, 31.0, 0.0, 1.25, 7.5, 126.875],
+        ),
+        (lambda: KEPT.time_s, [-1.0, 2.0, 3.0, 7.0, 8.0, 15.0, 18.9375, 31.0, 36.0, 38.4, 40.0, 41.0, 47.0, 52.0]),
+        (
+            lambda: KEPT.generated_bit,
+            [0.0, 0.0, 3.5, 17.5, 21.0, 45.5, 59.28125, 101.5, 119.0, 127.4, 133.0, 133.0, 133.0, 133.0],
+        ),
+        (lambda: KEPT.lost_bit, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 5.0, 5.0, 5.0, 5.0]),
+        (
+            lambda: KEPT.delivered_bit,
+            [0.0, 0.0, 0.0, 17.5, 21.0, 29.75, 59.28125, 101.5, 101.5, 102.4, 103.0, 103.375, 121.375, 121.375],
+        ),
+        (
+            lambda: [*KEPT.stored_bit, KEPT.largest_stored_bit],
+            [0.0, 0.0, 3.5, 0.0, 0.0, 15.75, 0.0, 0.0, 17.5, 25.0, 25.0, 24.625, 6.625, 6.625, 25.0],
+        ),
+        (
+            lambda: [*KEPT.latency.first_s, *KEPT.latency.last_s],
+            [
+                1.125,
+                0.925,
+                0.125,
+                0.125,
+                4.625,
+                2.225,
+                0.125,
+                5.125,
+                7.26785714,
+                8.69642857,
+                9.58928571,
+                10.3333333,
+                0.925,
+                0.125,
+                0.125,
+                4.625,
+                2.225,
+                0.125,
+                0.125,
+                7.26785714,
+                8.69642857,
+                9.58928571,
+                10.3333333,
+                10.4464286,
+            ],
+        ),
+        (
+            lambda: [
+                *KEPT.latency.volume_bit,
+                KEPT.latency.missing_bit,
+                KEPT.latency.delivered_share,
+                KEPT.latency.delivered_bit,
+            ],
+            [
+                3.5,
+                14.0,
+                3.5,
+                8.75,
+                15.75,
+                13.78125,
+                42.21875,
+                0.9,
+                0.6,
+                0.375,
+                15.625,
+                2.375,
+                6.625,
+                0.948242188,
+                121.375,
+            ],
+        ),
+        (
+            lambda: [KEPT.latency.quantile(share) for share in (0.05, 0.35, 0.75, 0.97)],
+            [0.125, 0.125, 3.97846939, math.inf],
+        ),
+        (
+            lambda: KEPT.latency.cdf([0.5, 3.0, 6.0, 9.5, 20.0]),
+            [0.433369954, 0.684970432, 0.795839844, 0.807324219, 0.948242188],
+        ),
+        (
+            lambda: [
+                *WAITED.cdf([1.0, 2.0, 4.5, 8.0, 11.0, 30.0]),
+                *(WAITED.quantile(share) for share in (0.01, 0.1, 0.4, 0.6, 0.75, 0.8)),
+            ],
+            [0.0, 0.0625, 0.08125, 0.426785714, 0.678571429, 0.75, 2.0, 5.0, 7.75409836, 9.9, 12.0, math.inf],
+        ),
+        (
+            lambda: [
+                (both := pool([WAITED, KEPT.latency])).missing_bit,
+                both.delivered_share,
+                both.quantile(0.5),
+                both.quantile(0.9),
+            ],
+            [10.625, 0.926215278, 1.1572449, 10.356129],
+        ),
+        (
+            lambda: RateTable((Step(9.0, 4.0), Step(5.0, 7.5), Step(2.0, 20.0))).rate_bit_s(
+                [3.0, 4.0, 4.5, 7.5, 19.0, 20.5]
+            ),
+            [9.0, 9.0, 5.0, 5.0, 2.0, 0.0],
+        ),
+        (
+            lambda: [
+                *(got := service(TABLE, (500.0, 3100.0), swing, 0.875)).edges_s,
+                *got.rate_bit_s,
+                got.capacity_bit,
+            ],
+            [500.0, 1200.0, 2400.0, 3100.0, 0.0, 1000000000.0, 2000000000.0, 2275000000000.0],
+        ),
+    ],
+)
+def test_rates_stores_and_latencies_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+FIRST = PlannedSession("LEO 2", "GEO 1", 61.5, 64.125, 99.875, 622.08e6, 2.25e10, 35.5e6, 41.25e6)
+SECOND = PlannedSession("LEO 1", "=GEO 3", 61.5, 70.25, 81.5, 1.75e9, 1.5e10, 36.5e6, 299.8e6)
+THIRD = PlannedSession("LEO 1", "GEO 1", 12.5, 14.25, 15.0, 3e9, 1e9, 36e6, 37e6)
+
+
+def later(time_s):
+    return utc(time_s + 0.75)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: csv_text([FIRST, SECOND], later).replace("\n", ",").split(",")[12:],
+            [
+                "LEO 2",
+                "GEO 1",
+                "2026-03-20T12:01:02.250Z",
+                "2026-03-20T12:01:04.875Z",
+                "2026-03-20T12:01:40.625Z",
+                "61.5",
+                "64.125",
+                "99.875",
+                "35500000.0",
+                "41250000.0",
+                "622080000.0",
+                "22500000000.0",
+                "LEO 1",
+                "'=GEO 3",
+                "2026-03-20T12:01:02.250Z",
+                "2026-03-20T12:01:11.000Z",
+                "2026-03-20T12:01:22.250Z",
+                "61.5",
+                "70.25",
+                "81.5",
+                "36500000.0",
+                "299800000.0",
+                "1750000000.0",
+                "15000000000.0",
+            ],
+        ),
+        (
+            lambda: contact_plan(
+                [FIRST, SECOND, THIRD], later, ("LEO 1", "LEO 2", "LEO 3"), ("GEO 1", "GEO 2", "=GEO 3")
+            ).split("\n")[1:],
+            [
+                '# node 1 is "LEO 1"',
+                '# node 2 is "LEO 2"',
+                '# node 3 is "LEO 3"',
+                '# node 4 is "GEO 1"',
+                '# node 5 is "GEO 2"',
+                '# node 6 is "=GEO 3"',
+                "@ 2026/03/20-12:00:00",
+                "# left out, no whole second with data: 1 4 from 14.250 s to 15.000 s",
+                "a contact +71 +82 1 6 218750000",
+                "a range +71 +82 1 6 2",
+                "a contact +65 +100 2 4 77760000",
+                "a range +65 +100 2 4 1",
+            ],
+        ),
+        (
+            lambda: contact_plan(
+                [planned(rate_bit_s=7.5), planned(start_s=2.0, locked_s=5.0625, end_s=6.5)], utc, ("LEO 1",), ("GEO 1",)
+            ).split("\n")[3:],
+            [
+                "@ 2026/03/20-12:00:00",
+                "# left out, no whole second with data: 1 2 from 5.062 s to 6.500 s",
+                "# left out, no whole byte a second: 1 2 from 12.250 s to 99.750 s",
+            ],
+        ),
+    ],
+)
+def test_plans_for_others_of_sessions_unlike_each_other(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: contact_plan([planned(rate_bit_s=4e10)], utc, ("LEO 1",), ("GEO 1",)),
+            OperationsError,
+            "the session of 'LEO 1' with 'GEO 1' has 4e+10 bit/s; ION takes at most 3.43597e+10 bit/s",
+        ),
+        (
+            lambda: RateTable((Step(9.0, 4.0), Step(5.0, 7.5), Step(2.0, -20.5))),
+            OperationsError,
+            "the largest range of step 2 is -20.5 m; give at least 0 m, inf allowed",
+        ),
+        (
+            lambda: Service(np.array([0.0, 1.0]), np.array([1.0]), 1.25),
+            OperationsError,
+            ("Service.availability is 1.25: it must be finite, at least 0, at most 1; it is a share of time"),
+        ),
+    ],
+)
+def test_a_refusal_of_a_plan_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words

@@ -293,3 +293,64 @@ def test_a_schedule_without_an_opportunity_is_empty():
 
 def test_views_that_touch_or_are_of_different_relays_are_taken():
     assert opportunities((0, 0, 1.0, 4.0), (0, 0, 4.0, 9.0), (0, 1, 2.0, 9.0)).start_s.size == 3
+
+
+BUSY = opportunities(
+    (0, 0, 0.0, 40.0), (1, 0, 1.0, 33.0), (2, 1, 2.0, 25.0), (2, 0, 3.0, 38.0), (3, 1, 4.5, 30.0), (0, 1, 6.0, 50.0)
+)
+SHARED = schedule(BUSY, 4, 2, (2, 1), Rules(overhead_s=1.5, shortest_s=4.0, longest_s=9.0), -3.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (lambda: SHARED.satellite, [0, 1, 2, 3, 2, 0, 1, 2, 0]),
+        (lambda: SHARED.relay, [0, 0, 1, 1, 0, 0, 0, 0, 1]),
+        (lambda: SHARED.terminal, [0, 1, 0, 0, 0, 1, 0, 1, 0]),
+        (lambda: SHARED.start_s, [0.0, 1.0, 2.0, 11.0, 18.0, 19.0, 27.0, 28.0, 29.0]),
+        (lambda: SHARED.locked_s, [1.5, 2.5, 3.5, 12.5, 19.5, 20.5, 28.5, 29.5, 30.5]),
+        (lambda: SHARED.end_s, [18.0, 19.0, 11.0, 29.0, 27.0, 28.0, 33.0, 38.0, 50.0]),
+        (
+            lambda: [
+                x
+                for each in (SHARED.satellite, SHARED.relay)
+                for x in totals(SHARED, each, 5, volumes(SHARED, 2.5), (-3.0, 55.0)).busy_s
+            ],
+            [48.0, 24.0, 28.0, 18.0, 0.0, 70.0, 48.0, 0.0, 0.0, 0.0],
+        ),
+        (
+            lambda: [
+                x
+                for each in (SHARED.satellite, SHARED.relay)
+                for x in totals(SHARED, each, 5, volumes(SHARED, 2.5), (-3.0, 55.0)).served_s
+            ],
+            [43.5, 21.0, 23.5, 16.5, 0.0, 61.0, 43.5, 0.0, 0.0, 0.0],
+        ),
+        (
+            lambda: [
+                x
+                for each in (SHARED.satellite, SHARED.relay)
+                for x in totals(SHARED, each, 5, volumes(SHARED, 2.5), (-3.0, 55.0)).volume_bit
+            ],
+            [108.75, 52.5, 58.75, 41.25, 0.0, 152.5, 108.75, 0.0, 0.0, 0.0],
+        ),
+        (
+            lambda: [
+                x
+                for each in (SHARED.satellite, SHARED.relay)
+                for x in totals(SHARED, each, 5, volumes(SHARED, 2.5), (-3.0, 55.0)).longest_gap_s
+            ],
+            [5.0, 22.0, 17.0, 26.0, 58.0, 17.0, 6.5, 58.0, 58.0, 58.0],
+        ),
+        (
+            lambda: [
+                x
+                for each in (SHARED.satellite, SHARED.relay)
+                for x in totals(SHARED, each, 5, volumes(SHARED, 2.5), (-3.0, 55.0)).sessions
+            ],
+            [3, 2, 3, 1, 0, 6, 3, 0, 0, 0],
+        ),
+    ],
+)
+def test_sessions_and_totals_of_relays_with_unlike_terminals(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
