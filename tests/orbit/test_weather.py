@@ -250,3 +250,73 @@ def test_the_share_with_any_clear_counts_months_by_their_time():
     sites = site("a", 0.0, 0.0, *([0.5] * 3 + [0.2] * 9)), site("b", 40.0, 0.0, 0.5)
     found = skies.any_clear(weather(sites, 0.0, epoch), (0.0, 86400.0))
     assert found == pytest.approx(0.25 * 0.75 + 0.75 * 0.6, rel=1e-12)
+
+
+MONTHLY = Site("monthly", 0.49, -0.29, tuple(0.05 + 0.07 * k for k in range(12)))
+APART = Weather(
+    orbit.Epoch("2026-02-27T06:00:00Z"),
+    (MONTHLY, CALERN, NEMEA),
+    7200.0,
+    skies.correlation((MONTHLY, CALERN, NEMEA), 9e5),
+)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [*skies.distances_m((MONTHLY, CALERN, NEMEA)).ravel()],
+            [0.0, 2728633.17, 3790754.45, 2728633.17, 0.0, 1470888.14, 3790754.45, 1470888.14, 0.0],
+        ),
+        (
+            lambda: [*APART.correlation.ravel()],
+            [1.0, 0.0482280423, 0.0148174553, 0.0482280423, 1.0, 0.195084953, 0.0148174553, 0.195084953, 1.0],
+        ),
+        (
+            lambda: [MONTHLY.in_month(month) for month in (1, 2, 11, 12)] + [CALERN.in_month(7)],
+            [0.05, 0.12, 0.75, 0.82, 0.5],
+        ),
+        (
+            lambda: [x for each in skies.months(APART.epoch, (-3.6e6, 3e6)) for x in each],
+            [-3600000.0, 1, -2268000.0, 2, 151200.0, 3, 2829600.0, 4],
+        ),
+        (
+            lambda: [x for each in skies.months(orbit.Epoch("2050-11-30T06:00:00Z"), (-9e4, 2.2e6)) for x in each],
+            [-90000.0, 11, 64800.0, 12],
+        ),
+        (
+            lambda: [x for each in skies.shares((MONTHLY, CALERN), APART.epoch, (-3600.0, 3e5)) for x in each.ravel()],
+            [154800.0, 148800.0, 0.12, 0.19, 0.5, 0.5],
+        ),
+        (
+            lambda: [skies.mean_availability(each, APART.epoch, (-3600.0, 3e5)) for each in APART.sites],
+            [0.1543083, 0.5, 0.3],
+        ),
+        (
+            lambda: [skies.any_clear(APART, (-3600.0, 3e5)), skies.any_clear(APART, (2e5, 3e5))],
+            [0.677292458, 0.690176404],
+        ),
+        (
+            lambda: [x for spells in skies.clear_spells(APART, (5000.0, 47_000.0), 3, 2) for x in spells.ravel()],
+            [36000.0, 43200.0, 7200.0, 14400.0, 21600.0, 28800.0, 43200.0, 47000.0, 28800.0, 36000.0],
+        ),
+        (
+            lambda: [x for spells in skies.clear_spells(APART, (130_000.0, 170_000.0), 5, 1) for x in spells.ravel()],
+            [165600.0, 170000.0, 151200.0, 165600.0],
+        ),
+        (
+            lambda: [
+                skies.normal_below(np.array([0.7, -0.4, 1.3, 0.2]), skies.correlation((*THREE, MONTHLY), 7e5)),
+                skies.normal_below(np.array([0.7, math.inf, -0.4]), skies.correlation(THREE, 3e6)),
+            ],
+            [0.186901781, 0.292758515],
+        ),
+        (lambda: skies._prime_roots(6), [1.41421356, 1.73205081, 2.23606798, 2.64575131, 3.31662479, 3.60555128]),
+        (
+            lambda: [*skies._factor(APART.correlation).ravel()],
+            [1.0, 0.0, 0.0, 0.0482280423, 0.998836351, 0.0, 0.0148174553, 0.194596778, 0.980771399],
+        ),
+    ],
+)
+def test_skies_of_sites_and_months_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
