@@ -12,7 +12,7 @@ from day_files import ALONE, HELD, KEPLERIAN, LIMITS, day_file, ephemeris
 from link_files import received_with
 from microrad import link, orbit
 from microrad.link import study as link_study
-from microrad.orbit import EARTH_RADIUS_M
+from microrad.orbit import EARTH_RADIUS_M, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
 from microrad.orbit.earth import figure
@@ -970,3 +970,153 @@ def test_a_partner_in_a_slot_stands_above_its_longitude_also_above_greenwich(tmp
     east = math.atan2(y, x) - partner.epoch.earth_rotation_rad(0.0)
     assert math.degrees(math.remainder(east, 2.0 * math.pi)) == pytest.approx(degrees, abs=1e-6)
     assert z == pytest.approx(0.0, abs=1.0)
+
+
+def exceeded(**seen):
+    """What is said of a mission whose numbers are all unlike each other."""
+    at = {"point_ahead_most_rad": 61e-6, "rate_most_rad_s": 345e-6, "range_most_m": 45.6789e6} | seen
+    m = SimpleNamespace(
+        communication=SimpleNamespace(distance_m=41e6),
+        beacon=SimpleNamespace(distance_m=42.5e6),
+        answer=SimpleNamespace(distance_m=39.75e6),
+        range_m=lambda table: table.distance_m,
+        point_ahead=SimpleNamespace(transverse_velocity_m_s=8765.0),
+        fine_pointing=SimpleNamespace(reference=SimpleNamespace(line_of_sight_rate_rad_s=210e-6)),
+    )
+    return list(geometry.beyond_the_mission(m, SimpleNamespace(encounters=[0], largest=at.__getitem__)))
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: exceeded(range_most_m=45.6789e6),
+            [
+                (
+                    "communication.distance is 41000 km, and the contacts reach a range of 45679 km, which "
+                    "costs 0.94 dB more than budgeted"
+                ),
+                (
+                    "beacon.distance is 42500 km, and the contacts reach a range of 45679 km, which costs 0.63 "
+                    "dB more than budgeted"
+                ),
+                (
+                    "answer.distance is 39750 km, and the contacts reach a range of 45679 km, which costs 1.21 "
+                    "dB more than budgeted"
+                ),
+                (
+                    "point_ahead.transverse_velocity is 8.765 km/s, and the contacts reach a velocity across "
+                    "the line of sight of 9.1437 km/s"
+                ),
+                (
+                    "fine_pointing.reference.line_of_sight_rate is 210 µrad/s, and the contacts reach a rate "
+                    "of the line of sight of 345 µrad/s"
+                ),
+            ],
+        ),
+        (
+            lambda: exceeded(range_most_m=42.0e6, rate_most_rad_s=1e-4),
+            [
+                (
+                    "communication.distance is 41000 km, and the contacts reach a range of 42000 km, which "
+                    "costs 0.21 dB more than budgeted"
+                ),
+                (
+                    "answer.distance is 39750 km, and the contacts reach a range of 42000 km, which costs 0.48 "
+                    "dB more than budgeted"
+                ),
+                (
+                    "point_ahead.transverse_velocity is 8.765 km/s, and the contacts reach a velocity across "
+                    "the line of sight of 9.1437 km/s"
+                ),
+            ],
+        ),
+        (
+            lambda: list(geometry.short_tail(SimpleNamespace(tail_s=5432.1))),
+            [("the orbits hold for 5432 s behind the span: data still on board then count as never arrived")],
+        ),
+    ],
+)
+def test_what_the_contacts_exceed_is_said_with_each_number(found, expected):
+    assert found() == expected
+
+
+def numbers(relay_bit, direct_bit, optical_bit=math.nan):
+    return Numbers(relay_bit, direct_bit, 1.0, 2.0, optical_bit, 3.0)
+
+
+MOVED = Swing("rate", "low", "high", numbers(6.0, 4.0, 5.0), numbers(9.0, 2.0, 1.25), numbers(8.0, 2.5, 3.0))
+BETWEEN = SimpleNamespace(span_s=(-20.0, 100.0), whole_s=(-20.0, 175.0))
+UNLIKE = [SimpleNamespace(start_s=start, end_s=end) for start, end in ((5.0, 12.0), (50.0, 61.0), (140.0, 150.0))]
+PARTIAL = operations.Service(np.array([10.0, 20.0, 45.0, 60.0]), np.array([3.0, 0.5, 7.0]), 0.75)
+
+
+def of_seen(*contacts):
+    whole = [orbit.Contact(*each, "Earth", "range") for each in contacts]
+    return SimpleNamespace(contacts=whole, range_m=(np.sin, np.cos), duration_s=100.0, partner="station")
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [MOVED.of_relay, MOVED.of_optical, MOVED.factor, MOVED.here.ratio, numbers(3.0, 0.0).ratio],
+            [3.0, 4.0, 4.0, 3.2, math.inf],
+        ),
+        (
+            lambda: [
+                replace(MOVED, here=numbers(8.0, 0.0)).of_relay,
+                replace(MOVED, here=numbers(8.0, 2.5)).of_optical,
+            ],
+            [math.inf, 1.0],
+        ),
+        (
+            lambda: [
+                geometry.longest_gap_s(UNLIKE, BETWEEN),
+                geometry.longest_gap_s(UNLIKE[:1], BETWEEN),
+                geometry.longest_gap_s([], BETWEEN),
+            ],
+            [79.0, 163.0, 120.0],
+        ),
+        (
+            lambda: [flow.carried_bit(PARTIAL, end_s) for end_s in (5.0, 15.0, 33.0, 50.0, 99.0)],
+            [0.0, 11.25, 27.375, 58.125, 110.625],
+        ),
+        (
+            lambda: [
+                x
+                for each in flow.one_at_a_time(
+                    [(4.0, 9.0, 2), (1.0, 6.0, 1), (2.0, 5.5, 0), (8.0, 12.0, 3), (12.0, 13.0, 1)]
+                )
+                for x in each
+            ],
+            [1.0, 6.0, 1, 6.0, 9.0, 2, 9.0, 12.0, 3, 12.0, 13.0, 1],
+        ),
+        (
+            lambda: [
+                x for c, _ in flow._granted(of_seen((-5.0, 35.0), (92.0, 132.0)), 0.375) for x in (c.start_s, c.end_s)
+            ],
+            [-5.0, 10.0, 92.0, 95.0, 100.0, 112.0],
+        ),
+        (
+            lambda: [
+                x
+                for step in flow.rate_table(
+                    (flow.Closing(9.0, 1.0, 2e7), flow.Closing(5.0, 2.0, 3.5e7), flow.Closing(2.0, 3.0, 3e7))
+                ).steps
+                for x in step
+            ],
+            [9.0, 20000000.0, 5.0, 35000000.0],
+        ),
+        (
+            lambda: [
+                *geometry.times(orbit.Contact(3.0, 9.0, "", ""))[[0, 1, -1]],
+                geometry.times(orbit.Contact(3.0, 9.0, "", "")).size,
+                geometry.times(orbit.Contact(3.0, 1234.0, "", "")).size,
+            ],
+            [3.0, 3.3, 9.0, 21, 125],
+        ),
+    ],
+)
+def test_parts_of_a_day_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
