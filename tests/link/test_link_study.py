@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import ncx2, norm
 
 import budgets
-from link_files import PATTERN, RECEIVERS, link_file, received_with
+from link_files import PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.core.units import parse_quantity
 from microrad.link import requirement
@@ -752,3 +752,480 @@ def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path
         near = replace(study, beam_radius=replace(study.beam_radius, gained_db=gained_db))
         assert (sentence.partition(" leaves ")[0] in " ".join(links_words.short(near))) is worth
     assert link_study.run_link_study(link_file(tmp_path)).beam_radius is None
+
+
+# ------------------------------------------------------------------------------- all numbers unlike each other
+UNLIKE = {
+    "terminals.leo_aperture": "6 cm",
+    "terminals.geo_aperture": "17 cm",
+    "point_ahead": {"transverse_velocity": "0.83 km/s", "corrected": False, "error": "0.7 urad"},
+    "beacon.transmit_power": "3.3 W",
+    "beacon.wavelength": "1.064 um",
+    "beacon.divergence": "560 urad",
+    "beacon.strehl": 0.55,
+    "beacon.pointing_error": "137 urad",
+    "beacon.distance": "39500 km",
+    "beacon.transmit_optics_loss": "1.1 dB",
+    "beacon.receive_optics_loss": "0.83 dB",
+    "beacon.required_power": "13 pW",
+    "answer.transmit_power": "1.7 W",
+    "answer.wavelength": "1.48 um",
+    "answer.divergence": "47 urad",
+    "answer.strehl": 0.62,
+    "answer.pointing_error": "7.7 urad",
+    "answer.distance": "41500 km",
+    "answer.transmit_optics_loss": "1.37 dB",
+    "answer.receive_optics_loss": "0.71 dB",
+    "answer.required_power": "83 pW",
+    "communication.transmit_power": "4.6 W",
+    "communication.wavelength": "1.5491 um",
+    "communication.strehl": 0.47,
+    "communication.pointing_error": "3.9 urad",
+    "communication.distance": "37700 km",
+    "communication.data_rate": "155.52 Mbit/s",
+    "communication.transmit_optics_loss": "0.91 dB",
+    "communication.receive_optics_loss": "1.23 dB",
+    "communication.tracking_split_loss": "0.46 dB",
+    "communication.implementation_loss": "2.6 dB",
+    "communication.receiver_sensitivity": "68 photon/bit",
+    "requirement.margin": "1.9 dB",
+    "requirement.outage": 0.02,
+}
+SHAKES = {"jitter": {"bias": ["1.3 urad", "-0.4 urad"], "rms": ["2.1 urad", "3.2 urad"], "bandwidth": "37 Hz"}}
+HOLES = {"terminals.leo_obscuration": 0.21, "terminals.geo_obscuration": 0.33, "point_ahead.corrected": True}
+INTO = {
+    "into": "single-mode fibre",
+    "mode_radius": "5.1 um",
+    "focal_length": "0.9 m",
+    "lateral_error": "0.8 um",
+    "angular_error": "3 mrad",
+    "defocus": "50 nm",
+    "coma": "35 nm",
+}
+THEIRS = {"jitter": {"bias": ["0.3 urad", "0.5 urad"], "rms": ["0.6 urad", "0.9 urad"], "bandwidth": "90 Hz"}}
+SLANTED = {"channel": {"zenith_transmission": 0.83, "elevation": "35 deg"}}
+SKIES = {"background_power": None, "background": SKY}
+CASES = {
+    "static": ({},),
+    "shaken": (SHAKES,),
+    "ratio": (
+        {"conventions.strehl": "ratio", "conventions.pointing_loss": "gain", "conventions.divergence": "half-1/e2"},
+    ),
+    "apd": (received_with("apd ook", **SKIES), HOLES),
+    "pattern": (PATTERN, SHAKES, HOLES, received_with("heterodyne qpsk", background=SKY)),
+    "fibre": (
+        {"communication.coupling": INTO | {"pointing_error": "1.1 urad"}},
+        PATTERN,
+        HOLES,
+        received_with("preamplified ook"),
+    ),
+    "ppm": (SHAKES, received_with("counting ppm")),
+    "clear": (SLANTED, received_with("pin ook"), {"answer.divergence": "31 urad"}),
+}
+
+
+@pytest.fixture(scope="module")
+def unlike(tmp_path_factory):
+    """The links whose numbers are all unlike each other, each case of them studied once."""
+    found = {}
+
+    def of(case):
+        if case not in found:
+            found[case] = studied(tmp_path_factory.mktemp(case), UNLIKE, *CASES[case])
+        return found[case]
+
+    return of
+
+
+def lines_of_all(study):
+    return [line for budget in study.budgets for line in (*budget.lines, *budget.totals)]
+
+
+def light_of(study):
+    names = ("received_power_w", "required_power_w", "irradiance_w_m2", "irradiance_on_axis_w_m2")
+    names += ("required_irradiance_w_m2", "radiant_intensity_w_sr")
+    photons = study.communication.received_photons_per_bit
+    return [*(getattr(budget, name) for budget in study.budgets for name in names), photons, study.largest_rate_bit_s]
+
+
+def shaking_of(study):
+    u = study.under_jitter
+    found = [u.error_rad, u.mean_loss_db, u.outage_loss_db, u.margin_db, u.outage, u.data_rate_bit_s]
+    found += [u.fades_per_s, u.fade_s, u.uncoded_penalty_db, u.best.half_angle_rad, u.best.loss_db, u.best.gain_db]
+    return [*found, u.best.wanted_half_angle_rad, u.best.current_excess_db]
+
+
+def acquisition_of(study):
+    f, light = study.finding, study.tracking
+    chances = [getattr(f.chances, each.name) for each in fields(f.chances)]
+    radii = [f.sigma_rad, f.beacon_radius_rad, f.answer_radius_rad, f.return_radius_rad]
+    wide = f.wide.outcome
+    seen = [light.power_w, light.signal_to_noise, light.noise_equivalent_angle.value]
+    return [*chances, *radii, wide.success_probability, wide.mean_time_s, f.wide.early_s, *seen]
+
+
+def swings_of(study):
+    return [
+        x
+        for each in study.tornados
+        for s in each.swings
+        for x in (s.value, s.low, s.high, s.margin_low_db, s.margin_high_db)
+    ]
+
+
+def ahead_of(study):
+    p = study.point_ahead
+    return [p.angle_rad, p.beam_half_angles, p.loss_db, p.mirror_range_rad]
+
+
+def values_of(study):
+    return [line.value for line in lines_of_all(study)]
+
+
+def noise_of(study):
+    return [line.value for line in study.receiver_noise]
+
+
+@pytest.mark.parametrize(("of", "case", "expected"), [
+    (values_of, "static", [
+        36.6275783, 101.704433, -0.91, -0.47, -0.489020278, -2.37437073, -289.709435, 110.750387, -1.23, -0.46,
+        -2.6, -49.1604277, -58.6770756, 9.5166479, 35.1851394, 80.0877392, -1.1, -0.55, -2.07940641,
+        -0.171484623, -293.377307, 114.013143, -0.83, -68.8221757, -78.8605665, 10.0383908, 32.3044892,
+        101.609543, -1.37, -0.62, -0.932524032, -1.82340786, -290.939925, 102.100788, -0.71, -60.3810368,
+        -70.8092191, 10.4281823,
+    ]),
+    (values_of, "shaken", [
+        36.6275783, 101.704433, -0.91, -0.47, -2.12273032, -3.87886396, -289.709435, 110.750387, -1.23, -0.46,
+        -2.6, -52.298631, -58.6770756, 6.37844463, 9.5166479, 35.1851394, 80.0877392, -1.1, -0.55, -2.07940641,
+        -0.171484623, -293.377307, 114.013143, -0.83, -68.8221757, -78.8605665, 10.0383908, 32.3044892,
+        101.609543, -1.37, -0.62, -0.932524032, -1.82340786, -290.939925, 102.100788, -0.71, -60.3810368,
+        -70.8092191, 10.4281823,
+    ]),
+    (values_of, "ratio", [
+        36.6275783, 101.704433, -0.91, -3.27902142, -0.978040555, -4.74874146, -289.709435, 110.750387, -1.23,
+        -0.46, -2.6, -54.8328401, -58.6770756, 3.84423547, 35.1851394, 74.0671393, -1.1, -2.59637311,
+        -0.519851603, -0.0428711559, -293.377307, 114.013143, -0.83, -75.2009804, -78.8605665, 3.65958603,
+        32.3044892, 95.5889427, -1.37, -2.07608311, -0.233131008, -0.455851964, -290.939925, 102.100788, -0.71,
+        -65.7907709, -70.8092191, 5.01844817,
+    ]),
+    (values_of, "apd", [
+        36.6275783, 101.704433, -0.91, -0.47, -0.489020278, 0.0, -289.709435, 110.750387, -0.500735563, -1.23,
+        -0.46, -2.6, 0.0, -47.2867925, 0.117005006, -57.0168754, 9.73008282, 35.1851394, 80.0877392, -1.1,
+        -0.55, -2.07940641, 0.0, -293.377307, 114.013143, -0.500735563, -0.83, -69.1514266, -78.8605665,
+        9.70913983, 32.3044892, 101.609543, -1.37, -0.62, -0.932524032, 0.0, -290.939925, 102.100788,
+        -0.195875384, -0.71, -58.7535043, -70.8092191, 12.0557147,
+    ]),
+    (values_of, "pattern", [
+        36.6275783, 101.704433, -4.03183361, -0.91, -0.47, -0.539028234, 0.0, -289.709435, 110.750387,
+        -0.500735563, -1.23, -0.46, -2.6, 0.0, -51.3686341, 1.02046816, -68.9028422, 17.5342081, 17.949855,
+        35.1851394, 80.0877392, -1.1, -0.55, -2.07940641, 0.0, -293.377307, 114.013143, -0.500735563, -0.83,
+        -69.1514266, -78.8605665, 9.70913983, 32.3044892, 101.609543, -1.37, -0.62, -0.932524032, 0.0,
+        -290.939925, 102.100788, -0.195875384, -0.71, -58.7535043, -70.8092191, 12.0557147,
+    ]),
+    (values_of, "fibre", [
+        36.6275783, 101.704433, -4.03183361, -0.91, -0.47, -0.123381341, 0.0, -289.709435, 110.750387,
+        -0.500735563, -1.23, -2.33185178, -0.355010973, -0.46, -2.6, 0.0, -53.63985, 0.112868361, -60.9535025,
+        7.31365253, 35.1851394, 80.0877392, -1.1, -0.55, -2.07940641, 0.0, -293.377307, 114.013143,
+        -0.500735563, -0.83, -69.1514266, -78.8605665, 9.70913983, 32.3044892, 101.609543, -1.37, -0.62,
+        -0.932524032, 0.0, -290.939925, 102.100788, -0.195875384, -0.71, -58.7535043, -70.8092191, 12.0557147,
+    ]),
+    (values_of, "ppm", [
+        36.6275783, 101.704433, -0.91, -0.47, -2.12273032, -3.87886396, -289.709435, 110.750387, -1.23, -0.46,
+        -2.6, 0.0, -52.298631, -72.723034, 20.4244031, 23.5626063, 35.1851394, 80.0877392, -1.1, -0.55,
+        -2.07940641, -0.171484623, -293.377307, 114.013143, -0.83, -68.8221757, -78.8605665, 10.0383908,
+        32.3044892, 101.609543, -1.37, -0.62, -0.932524032, -1.82340786, -290.939925, 102.100788, -0.71,
+        -60.3810368, -70.8092191, 10.4281823,
+    ]),
+    (values_of, "clear", [
+        36.6275783, 101.704433, -0.91, -0.47, -0.489020278, -2.37437073, -289.709435, -1.40799004, 110.750387,
+        -1.23, -0.46, -2.6, 0.0, -50.5684177, 0.0871563877, -45.6619938, -4.90642391, 35.1851394, 80.0877392,
+        -1.1, -0.55, -2.07940641, -0.171484623, -293.377307, -1.40799004, 114.013143, -0.83, -70.2301657,
+        -78.8605665, 8.63040073, 32.3044892, 105.224266, -1.37, -0.62, -2.14354379, -4.19137144, -290.939925,
+        -1.40799004, 102.100788, -0.71, -61.7532869, -70.8092191, 9.05593217,
+    ]),
+    (light_of, "static", [
+        1.21326936e-08, 1.35610226e-09, 1.43538864e-06, 3.09249215e-06, 1.60437067e-07, 3944494060.0,
+        1.31154269e-10, 1.3e-11, 6.99511253e-09, 1.33316471e-08, 6.93354962e-10, 18326435.4, 9.16001784e-10,
+        8.3e-11, 3.81508253e-07, 8.30036378e-07, 3.45689119e-08, 1239348140.0, 608.378283, 290836023.0,
+    ]),
+    (light_of, "shaken", [
+        5.89029304e-09, 1.35610226e-09, 6.96865842e-07, 3.09249215e-06, 1.60437067e-07, 3944494060.0,
+        1.31154269e-10, 1.3e-11, 6.99511253e-09, 1.33316471e-08, 6.93354962e-10, 18326435.4, 9.16001784e-10,
+        8.3e-11, 3.81508253e-07, 8.30036378e-07, 3.45689119e-08, 1239348140.0, 295.361153, 436144811.0,
+    ]),
+    (light_of, "apd", [
+        1.8677586e-08, 1.98752438e-09, 2.47974246e-06, 3.09249215e-06, 2.6387503e-07, 3944494060.0,
+        1.21578655e-10, 1.3e-11, 7.27684573e-09, 1.33316471e-08, 7.78088837e-10, 18326435.4, 1.33244585e-09,
+        8.3e-11, 5.80556809e-07, 8.30036378e-07, 3.61637325e-08, 1239348140.0, 936.563481, 876344353.0,
+    ]),
+    (light_of, "pattern", [
+        7.29686966e-09, 1.28740675e-10, 9.68773881e-07, 1.22215206e-06, 1.70923435e-08, 1558862990.0,
+        1.21578655e-10, 1.3e-11, 7.27684573e-09, 1.33316471e-08, 7.78088837e-10, 18326435.4, 1.33244585e-09,
+        8.3e-11, 5.80556809e-07, 8.30036378e-07, 3.61637325e-08, 1239348140.0, 365.892126, 5691242050.0,
+    ]),
+    (light_of, "clear", [
+        8.77320394e-09, 2.71519244e-08, 1.03793582e-06, 2.23619464e-06, 3.21227629e-06, 3944494060.0,
+        9.48382269e-11, 1.3e-11, 5.05819656e-09, 9.6401725e-09, 6.93354962e-10, 18326435.4, 6.6783828e-10,
+        8.3e-11, 2.78149912e-07, 1.37965485e-06, 3.45689119e-08, 2848824190.0, 439.921005, 713944.974,
+    ]),
+    (shaking_of, "shaken", [
+        8.12547176e-06, 2.64608929, 6.00159428, 6.37844463, 1.95882922e-05, 436144811.0, 0.00366474363,
+        0.00237542443, math.nan, 1.93218848e-05, 4.34294482, 98.9669653, 1.93218848e-05, 0.253826246,
+    ]),
+    (shaking_of, "pattern", [
+        8.12547176e-06, 0.132022025, 0.539028234, 17.5342081, 3.7078819e-37, 5691242050.0, 9.73270932e-30,
+        0.000941934176, 0.156285725, 3.27536107e-05, 0.53455588, 98.1911603, 1.14911524e-05, 0.0,
+    ]),
+    (shaking_of, "ppm", [
+        8.12547176e-06, 2.64608929, 6.00159428, 20.4244031, 1.08196534e-12, 800000000.0, 1.65631942e-11,
+        0.00140407198, 5.1297885, 1.93218848e-05, 4.34294482, 98.9669653, 1.93218848e-05, 0.253826246,
+    ]),
+    (acquisition_of, "static", [
+        0.298301467, 0.9, 1.0, 1.0, 1.0, 0.95, 0.000283827387, 0.000333053598, 2.89525077e-05, 1.64364615e-05,
+        0.821692372, 33.1029395, 55.4575782, 9.16001784e-10, 170.278935, 8.53297914e-08,
+    ]),
+    (acquisition_of, "pattern", [
+        0.285151737, 0.9, 1.0, 1.0, 1.0, 0.95, 0.000279115804, 0.000326197782, 2.87366303e-05, 3.27536107e-05,
+        0.804926043, 33.5147898, 55.4575782, 1.33244585e-09, 246.277734, 5.89978875e-08,
+    ]),
+    (acquisition_of, "clear", [
+        0.232717871, 0.9, 0.999999996, 1.0, 1e-12, 0.95, 0.000283827387, 0.000313394309, 2.0632688e-05, 0.0,
+        2.32822604e-12, 30.5311867, math.nan, 6.6783828e-10, 124.575556, 1.16634969e-07,
+    ]),
+    (swings_of, "static", [
+        0.17, 0.153, 0.187, 8.60149809, 10.3445016, 37700000.0, 33930000.0, 41470000.0, 10.4317977, 8.6887942,
+        0.91, 0.41, 1.41, 10.0166479, 9.0166479, 1.23, 0.73, 1.73, 10.0166479, 9.0166479, 2.6, 2.1, 3.1,
+        10.0166479, 9.0166479, 0.47, 0.0, 0.97, 9.9866479, 9.0166479, 0.46, 0.0, 0.96, 9.9766479, 9.0166479,
+        4.6, 4.14, 5.06, 9.059073, 9.93057475, 155520000.0, 139968000.0, 171072000.0, 9.97422281, 9.10272105,
+        68.0, 61.2, 74.8, 9.97422281, 9.10272105, 830.0, 747.0, 913.0, 9.84280363, 9.17077692, 0.06, 0.054,
+        0.066, 9.14554238, 9.74318949, 3.9e-06, 3.51e-06, 4.29e-06, 9.74842255, 9.27509285, 1.5491e-06,
+        1.39419e-06, 1.70401e-06, 9.30256319, 9.59967321, 0.17, 0.153, 0.187, 9.12324096, 10.8662445,
+        39500000.0, 35550000.0, 43450000.0, 10.9535406, 9.21053707, 0.55, 0.05, 1.05, 10.5383908, 9.53839077,
+        1.1, 0.6, 1.6, 10.5383908, 9.53839077, 0.83, 0.33, 1.33, 10.5383908, 9.53839077, 3.3, 2.97, 3.63,
+        9.58081587, 10.4523176, 1.3e-11, 1.17e-11, 1.43e-11, 10.4959657, 9.62446392, 0.000137, 0.0001233,
+        0.0001507, 10.4502868, 9.58490665, 0.00056, 0.000504, 0.000616, 10.4255538, 9.60118758, 830.0, 747.0,
+        913.0, 10.0558449, 10.0208687, 0.06, 0.054, 0.066, 9.51303246, 11.256036, 41500000.0, 37350000.0,
+        45650000.0, 11.3433321, 9.60032857, 0.62, 0.12, 1.12, 10.9281823, 9.92818227, 1.37, 0.87, 1.87,
+        10.9281823, 9.92818227, 0.71, 0.21, 1.21, 10.9281823, 9.92818227, 1.7, 1.53, 1.87, 9.97060737,
+        10.8421091, 8.3e-11, 7.47e-11, 9.13e-11, 10.8857572, 10.0142554, 7.7e-06, 6.93e-06, 8.47e-06,
+        10.7394797, 10.0982343, 4.7e-05, 4.23e-05, 5.17e-05, 10.6968789, 10.0786308, 830.0, 747.0, 913.0,
+        10.6539237, 10.1927963,
+    ]),
+    (swings_of, "clear", [
+        0.17, 0.153, 0.187, -5.82157372, -4.07857021, 37700000.0, 33930000.0, 41470000.0, -3.9912741,
+        -5.73427762, 0.83, 0.747, 0.913, -5.70257532, -4.18621736, 0.91, 0.41, 1.41, -4.40642391, -5.40642391,
+        1.23, 0.73, 1.73, -4.40642391, -5.40642391, 2.6, 2.1, 3.1, -4.40642391, -5.40642391, 5.0, 4.5, 5.5,
+        -5.40642391, -4.40642391, 0.47, 0.0, 0.97, -4.43642391, -5.40642391, 0.46, 0.0, 0.96, -4.44642391,
+        -5.40642391, 4.6, 4.14, 5.06, -5.36399882, -4.49249706, 0.8, 0.72, 0.88, -5.36399864, -4.49249723,
+        2e-12, 1.8e-12, 2.2e-12, -4.45053735, -5.31897214, 1e-06, 1e-07, 1e-05, -5.29722906, -4.433913, 830.0,
+        747.0, 913.0, -4.58026819, -5.25229489, 0.06, 0.054, 0.066, -5.27752943, -4.67988232, 3.9e-06, 3.51e-06,
+        4.29e-06, -4.67464927, -5.14797896, 155520000.0, 139968000.0, 171072000.0, -4.67687546, -5.11411103,
+        1.5491e-06, 1.39419e-06, 1.70401e-06, -5.12050845, -4.82339878, 0.610865238, 0.549778714, 0.671951762,
+        -5.04322513, -4.79624345, 20.0, 19.5, 20.5, -4.91705985, -4.89694492, 1e-09, 9e-10, 1.1e-09,
+        -4.90640658, -4.90644125, 1e-11, 9e-12, 1.1e-11, -4.90642374, -4.90642409, 0.17, 0.153, 0.187,
+        7.71525092, 9.45825444, 39500000.0, 35550000.0, 43450000.0, 9.54555055, 7.80254703, 0.83, 0.747, 0.913,
+        7.83424932, 9.35060729, 0.55, 0.05, 1.05, 9.13040073, 8.13040073, 1.1, 0.6, 1.6, 9.13040073, 8.13040073,
+        0.83, 0.33, 1.33, 9.13040073, 8.13040073, 3.3, 2.97, 3.63, 8.17282583, 9.04432759, 1.3e-11, 1.17e-11,
+        1.43e-11, 9.08797564, 8.21647388, 0.000137, 0.0001233, 0.0001507, 9.04229673, 8.17691661, 0.00056,
+        0.000504, 0.000616, 9.01756376, 8.19319754, 0.610865238, 0.549778714, 0.671951762, 8.49359952,
+        8.74058119, 830.0, 747.0, 913.0, 8.64785491, 8.61287862, 0.06, 0.054, 0.066, 8.14078236, 9.88378587,
+        41500000.0, 37350000.0, 45650000.0, 9.97108198, 8.22807846, 0.83, 0.747, 0.913, 8.25978076, 9.77613872,
+        7.7e-06, 6.93e-06, 8.47e-06, 9.77149519, 8.29749827, 830.0, 747.0, 913.0, 9.57483201, 8.51486283, 0.62,
+        0.12, 1.12, 9.55593217, 8.55593217, 1.37, 0.87, 1.87, 9.55593217, 8.55593217, 0.71, 0.21, 1.21,
+        9.55593217, 8.55593217, 1.7, 1.53, 1.87, 8.59835726, 9.46985902, 8.3e-11, 7.47e-11, 9.13e-11,
+        9.51350707, 8.64200531, 3.1e-05, 2.79e-05, 3.41e-05, 8.48511421, 9.32752656, 0.610865238, 0.549778714,
+        0.671951762, 8.91913095, 9.16611263,
+    ]),
+    (ahead_of, "static", [
+        5.53716398e-06, 0.336882971, 2.37437073, 1.1074328e-05,
+    ]),
+    (ahead_of, "pattern", [
+        5.53716398e-06, 0.169055071, 0.605883035, 1.1074328e-05,
+    ]),
+    (noise_of, "apd", [
+        5.06042454e-08, 5.06042454e-09, 2.73007322e-10, 8.32282415e-09, 1.97180121e-08,
+    ]),
+    (noise_of, "pattern", [
+        0.707106781, 0.000596051712,
+    ]),
+    (noise_of, "fibre", [
+        2.89348808e-06, 2.89348808e-07, 1.77227134e-06, 3.24654702e-08, 3.24654702e-09, 2.81561663e-08,
+    ]),
+    (noise_of, "clear", [
+        7.35424852e-10, 7.35424852e-11, 1.76443181e-11, 1.76483183e-10, 1.97180121e-08,
+    ]),
+])  # fmt: skip
+def test_links_of_numbers_unlike_each_other(unlike, of, case, expected):
+    assert of(unlike(case)) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("case", "expected"), [
+    ("shaken", [
+        "Transmit power (dBm): P = 4.6 W | mission file, line 52 | whatever the pointing error and the data rate | ",
+        ("LEO aperture gain (dB): (pi D / lambda)^2, D = 60 mm, lambda = 1.5491 µm | mission file, line 25; "
+         "mission file, line 53 | uniformly lit, unobscured, diffraction-limited: an upper bound, of which a "
+         "Gaussian beam cut by the aperture reaches 0.81 at best (Klein and Degnan 1974) | "),
+        ("Transmit optics loss (dB): as given | mission file, line 58 | whatever the pointing error and the "
+         "data rate | "),
+        ("Strehl loss (dB): as given in dB | mission file, line 54; mission file, line 29 | on axis, small "
+         "wavefront error (Marechal) | "),
+        ("Pointing loss (dB): exp(-2 (error / theta)^2), theta = 2 lambda / (pi D), error = 8.125 µrad | error"
+         " that the jitter exceeds for 2 % of the time: mission file, line 155; mission file, line 156; "
+         "mission file, line 66 | Gaussian beam of 1/e2 radius D/2 at the aperture; static error | "),
+        ("Point-ahead loss (dB): not corrected: 2 v / c = 5.537 µrad | mission file, line 21; mission file, "
+         "line 22 | added to the pointing error in its worst direction | "),
+        "Free-space loss (dB): (lambda / (4 pi R))^2, R = 37700 km | mission file, line 56 | vacuum, far field | ",
+        ("GEO aperture gain (dB): (pi D / lambda)^2, D = 170 mm, lambda = 1.5491 µm | mission file, line 26; "
+         "mission file, line 53 | area pi D^2 / 4, all of its light on the detector | "),
+        ("Receive optics loss (dB): as given | mission file, line 59 | whatever the pointing error and the "
+         "data rate | "),
+        ("Tracking split loss (dB): as given | mission file, line 60 | whatever the pointing error and the "
+         "data rate | "),
+        ("Implementation loss (dB): as given | mission file, line 61 | whatever the pointing error and the "
+         "data rate | "),
+        "Received power (dBm): sum of the lines above: 295.4 photon/bit | computed | where every line holds | ",
+        ("Required power (dBm): n (h c / lambda) R, n = 68 photon/bit, R = 155.52 Mbit/s | mission file, line "
+         "62; mission file, line 57 | sensitivity the same at every data rate | "),
+        "Margin (dB): received power less required power | computed | where every line holds | ",
+        ("Static margin (dB): at 3.9 µrad of pointing error, without the jitter | computed | where every line "
+         "holds | "),
+    ]),
+    ("apd", [
+        "Transmit power (dBm): P = 4.6 W | mission file, line 54 | whatever the pointing error and the data rate | ",
+        ("LEO aperture gain (dB): (pi D / lambda)^2, D = 60 mm, lambda = 1.5491 µm | mission file, line 25; "
+         "mission file, line 55 | uniformly lit, unobscured, diffraction-limited: an upper bound, of which a "
+         "Gaussian beam cut by the aperture reaches 0.81 at best (Klein and Degnan 1974) | the obscuration of "
+         "0.21 is not in it: only pointing_loss = \"pattern\" takes it into account"),
+        ("Transmit optics loss (dB): as given | mission file, line 60 | whatever the pointing error and the "
+         "data rate | "),
+        ("Strehl loss (dB): as given in dB | mission file, line 56; mission file, line 31 | on axis, small "
+         "wavefront error (Marechal) | "),
+        ("Pointing loss (dB): exp(-2 (error / theta)^2), theta = 2 lambda / (pi D), error = 3.9 µrad | mission"
+         " file, line 57 | Gaussian beam of 1/e2 radius D/2 at the aperture; static error | "),
+        ("Point-ahead loss (dB): corrected; what that leaves is for the pointing error to hold | mission file,"
+         " line 21; mission file, line 22 | added to the pointing error in its worst direction | "),
+        "Free-space loss (dB): (lambda / (4 pi R))^2, R = 37700 km | mission file, line 58 | vacuum, far field | ",
+        ("GEO aperture gain (dB): (pi D / lambda)^2, D = 170 mm, lambda = 1.5491 µm | mission file, line 26; "
+         "mission file, line 55 | area pi D^2 / 4, all of its light on the detector | "),
+        ("GEO obscuration loss (dB): 1 - e^2, e = 0.33 | mission file, line 28 | area pi D^2 / 4, all of its "
+         "light on the detector | "),
+        ("Receive optics loss (dB): as given | mission file, line 61 | whatever the pointing error and the "
+         "data rate | "),
+        ("Tracking split loss (dB): as given | mission file, line 62 | whatever the pointing error and the "
+         "data rate | "),
+        ("Implementation loss (dB): as given | mission file, line 63 | whatever the pointing error and the "
+         "data rate | "),
+        ("Inter-symbol loss (dB): taken as none | not given | whatever the pointing error and the data rate | "
+         "left at 0 dB"),
+        "Received power (dBm): sum of the lines above: 936.6 photon/bit | computed | where every line holds | ",
+        ("Extinction penalty (dB): a part of the required power below, which would be -57.13 dBm if spaces "
+         "were dark | mission file, line 74 | extinction ratio as given, the best threshold | "),
+        ("Required power (dBm): OOK, apd: 99.66 photon/bit at a bit error ratio of 1e-06, code gain 5 dB, R = "
+         "155.52 Mbit/s | mission file, line 69; mission file, line 59 | noise of the receiver as given, white"
+         " | "),
+    ]),
+    ("pattern", [
+        ("LEO aperture gain (dB): (pi D / lambda)^2, D = 60 mm, lambda = 1.5491 µm | mission file, line 25; "
+         "mission file, line 55 | evenly lit and unobscured; how it is lit stands below | "),
+        ("Illumination (dB): 2/a^2 (exp(-a^2) - exp(-a^2 e^2))^2, a = 1.5, M^2 = 1.2, e = 0.21 | mission file,"
+         " line 65; mission file, line 66; mission file, line 67 | Gaussian beam, light cut off included "
+         "(Klein and Degnan 1974); M^2 widens the far field | "),
+        ("Pointing loss (dB): far field of the lit aperture, by its diffraction integral, error = 8.125 µrad |"
+         " error that the jitter exceeds for 2 % of the time: mission file, line 174; mission file, line 175; "
+         "mission file, line 85 | main lobe of a perfect wavefront; static error | "),
+        "Received power (dBm): sum of the lines above: 365.9 photon/bit | computed | where every line holds | ",
+        ("Phase error penalty (dB): a part of the required power below, which would be -69.92 dBm if the phase"
+         " were right | mission file, line 76 | Gaussian phase error that rests during a symbol | "),
+        ("Required power (dBm): QPSK, heterodyne: 6.456 photon/bit at a bit error ratio of 1e-06, code gain 5 "
+         "dB, R = 155.52 Mbit/s | mission file, line 73; mission file, line 59 | noise of the receiver as "
+         "given, white | "),
+    ]),
+    ("fibre", [
+        ("Illumination (dB): 2/a^2 (exp(-a^2) - exp(-a^2 e^2))^2, a = 1.5, M^2 = 1.2, e = 0.21 | mission file,"
+         " line 74; mission file, line 75; mission file, line 76 | Gaussian beam, light cut off included "
+         "(Klein and Degnan 1974); M^2 widens the far field | "),
+        ("Pointing loss (dB): far field of the lit aperture, by its diffraction integral, error = 3.9 µrad | "
+         "mission file, line 57 | main lobe of a perfect wavefront; static error | "),
+        ("GEO aperture gain (dB): (pi D / lambda)^2, D = 170 mm, lambda = 1.5491 µm | mission file, line 26; "
+         "mission file, line 55 | area pi D^2 / 4; what takes its light stands below | "),
+        ("GEO obscuration loss (dB): 1 - e^2, e = 0.33 | mission file, line 28 | area pi D^2 / 4; what takes "
+         "its light stands below | "),
+        ("Coupling loss (dB): single-mode fibre: 0.5845 of the light in the aperture, a = 0.9768 | mission "
+         "file, line 65; mission file, line 66; mission file, line 67; mission file, line 68; mission file, "
+         "line 69; mission file, line 70; mission file, line 71 | overlap with a Gaussian mode, plane wave, "
+         "scalar optics, no stray light | "),
+        ("Receive pointing loss (dB): error = 1.1 µrad | mission file, line 72 | static error in its worst "
+         "direction | "),
+        "Received power (dBm): sum of the lines above: 216.9 photon/bit | computed | where every line holds | ",
+        ("Extinction penalty (dB): a part of the required power below, which would be -61.07 dBm if spaces "
+         "were dark | mission file, line 87 | extinction ratio as given, the best threshold | "),
+        ("Required power (dBm): OOK, preamplified: 40.26 photon/bit at a bit error ratio of 1e-06, code gain 5"
+         " dB, R = 155.52 Mbit/s | mission file, line 82; mission file, line 59 | noise of the receiver as "
+         "given, white | "),
+        "Transmit power (dBm): P = 3.3 W | mission file, line 34 | whatever the pointing error and the data rate | ",
+        ("Beam gain (dB): 8 / theta^2, theta = 280 µrad half angle at 1/e2 | mission file, line 36; mission "
+         "file, line 32 | Gaussian beam, far field, not cut by its aperture | the obscuration of 0.21 is not "
+         "in it: what it stops of the beam belongs into transmit_optics_loss"),
+        ("Transmit optics loss (dB): as given | mission file, line 40 | whatever the pointing error and the "
+         "data rate | "),
+        ("Strehl loss (dB): as given in dB | mission file, line 37; mission file, line 31 | on axis, small "
+         "wavefront error (Marechal) | "),
+        ("Pointing loss (dB): exp(-2 (error / theta)^2), error = 137 µrad, theta = 280 µrad half angle at 1/e2"
+         " | mission file, line 38 | Gaussian beam, far field, not cut by its aperture; static error | "),
+        "Free-space loss (dB): (lambda / (4 pi R))^2, R = 39500 km | mission file, line 39 | vacuum, far field | ",
+        ("GEO aperture gain (dB): (pi D / lambda)^2, D = 170 mm, lambda = 1.064 µm | mission file, line 26; "
+         "mission file, line 35 | area pi D^2 / 4, all of its light on the detector | "),
+        ("Receive optics loss (dB): as given | mission file, line 41 | whatever the pointing error and the "
+         "data rate | "),
+        "Received power (dBm): sum of the lines above | computed | where every line holds | ",
+        "Required power (dBm): as given | mission file, line 42 | whatever the pointing error and the data rate | ",
+        "Transmit power (dBm): P = 1.7 W | mission file, line 44 | whatever the pointing error and the data rate | ",
+        ("Beam gain (dB): 8 / theta^2, theta = 23.5 µrad half angle at 1/e2 | mission file, line 46; mission "
+         "file, line 32 | Gaussian beam, far field, not cut by its aperture | the obscuration of 0.33 is not "
+         "in it: what it stops of the beam belongs into transmit_optics_loss"),
+        ("Transmit optics loss (dB): as given | mission file, line 50 | whatever the pointing error and the "
+         "data rate | "),
+        ("Strehl loss (dB): as given in dB | mission file, line 47; mission file, line 31 | on axis, small "
+         "wavefront error (Marechal) | "),
+        ("Pointing loss (dB): exp(-2 (error / theta)^2), error = 7.7 µrad, theta = 23.5 µrad half angle at "
+         "1/e2 | mission file, line 48 | Gaussian beam, far field, not cut by its aperture; static error | "),
+        "Free-space loss (dB): (lambda / (4 pi R))^2, R = 41500 km | mission file, line 49 | vacuum, far field | ",
+        ("LEO aperture gain (dB): (pi D / lambda)^2, D = 60 mm, lambda = 1.48 µm | mission file, line 25; "
+         "mission file, line 45 | area pi D^2 / 4, all of its light on the detector | "),
+        ("LEO obscuration loss (dB): 1 - e^2, e = 0.21 | mission file, line 27 | area pi D^2 / 4, all of its "
+         "light on the detector | "),
+        ("Receive optics loss (dB): as given | mission file, line 51 | whatever the pointing error and the "
+         "data rate | "),
+        "Received power (dBm): sum of the lines above | computed | where every line holds | ",
+        "Required power (dBm): as given | mission file, line 52 | whatever the pointing error and the data rate | ",
+    ]),
+    ("clear", [
+        ("Pointing loss (dB): exp(-2 (error / theta)^2), theta = 2 lambda / (pi D), error = 3.9 µrad | mission"
+         " file, line 55 | Gaussian beam of 1/e2 radius D/2 at the aperture; static error | "),
+        ("Free-space loss (dB): (lambda / (4 pi R))^2, R = 37700 km: 35310 km up, at the elevation of the "
+         "channel | mission file, line 56 | vacuum, far field | elevation and distance are typed beside the "
+         "table orbit, in which both terminals fly: from 500 km up the range at 35 deg is 815.1 km"),
+        ("Clear-sky loss (dB): T^m, T = 0.83 to the zenith, air mass m = 1.740 (Kasten and Young 1989) | "
+         "mission file, line 166; mission file, line 167 | clear sky, from 10 degrees of elevation; no "
+         "turbulence, no clouds | turbulence is not in this budget: scintillation and beam wander come on top"),
+        "Received power (dBm): sum of the lines above: 439.9 photon/bit | computed | where every line holds | ",
+        ("Extinction penalty (dB): a part of the required power below, which would be -45.75 dBm if spaces "
+         "were dark | mission file, line 73 | extinction ratio as given, the best threshold | "),
+        ("Required power (dBm): OOK, pin: 1361 photon/bit at a bit error ratio of 1e-06, code gain 5 dB, R = "
+         "155.52 Mbit/s | mission file, line 67; mission file, line 57 | noise of the receiver as given, white"
+         " | "),
+    ]),
+    ("ppm", [
+        ("Pointing loss (dB): exp(-2 (error / theta)^2), theta = 2 lambda / (pi D), error = 8.125 µrad | error"
+         " that the jitter exceeds for 2 % of the time: mission file, line 165; mission file, line 166; "
+         "mission file, line 76 | Gaussian beam of 1/e2 radius D/2 at the aperture; static error | "),
+        ("Required power (dBm): PPM, photon-counting: 2.679 photon/bit at a bit error ratio of 1e-06, code "
+         "gain 5 dB, R = 155.52 Mbit/s | mission file, line 67; mission file, line 57 | noise of the receiver "
+         "as given, white | "),
+    ]),
+])  # fmt: skip
+def test_lines_of_links_unlike_each_other_say_where_each_number_comes_from(unlike, case, expected):
+    written = {
+        f"{x.name} ({x.unit}): {x.basis} | {x.source} | {x.regime} | {x.warning}" for x in lines_of_all(unlike(case))
+    }
+    assert not set(expected) - written
