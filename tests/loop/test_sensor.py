@@ -291,3 +291,182 @@ def test_there_is_no_angle_without_light(ratio):
 def test_what_is_no_spot_is_refused(kind, values, message):
     with pytest.raises(ValueError, match=message):
         kind(*values)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: OpticalSensor(-0.25e-6, 1e-3, 0.0, 1, 2),
+            ValueError,
+            (
+                "optical sensor: noise_rad is -250 nrad; give a finite number of at least 0 (0 rad "
+                "switches the noise off)"
+            ),
+        ),
+        (
+            lambda: OpticalSensor(0.25e-6, 0.0, 0.0, 1, 2),
+            ValueError,
+            (
+                "optical sensor: field_of_view_rad is 0 rad, so it never sees the spot; give the radial "
+                "half angle beyond which the spot is lost, above 0 rad (inf: never lost)"
+            ),
+        ),
+        (
+            lambda: OpticalSensor(0.25e-6, 1e-3, math.inf, 1, 2),
+            ValueError,
+            ("optical sensor: resolution_rad is inf; give a finite number of at least 0 (0 rad is an ideal converter)"),
+        ),
+        (
+            lambda: OpticalSensor(0.25e-6, 1e-3, 0.0, 0, 2),
+            ValueError,
+            (
+                "optical sensor: every is 0; give a whole number of at least 1: control samples from one "
+                "sensor sample to the next"
+            ),
+        ),
+        (
+            lambda: OpticalSensor(0.25e-6, 1e-3, 0.0, 1, True),
+            ValueError,
+            (
+                "optical sensor: delay_steps is True; give a whole number of at least 0: plant steps from "
+                "exposure to delivery"
+            ),
+        ),
+        (
+            lambda: StrainGauge(0.5e-6, -1.25e-9),
+            ValueError,
+            (
+                "strain gauge: resolution_rad is -1.25 nrad; give a finite number of at least 0 (0 rad is "
+                "an ideal converter)"
+            ),
+        ),
+        (
+            lambda: built(rate_hz=7.5e3),
+            ValueError,
+            (
+                "optical sensor: its sample rate of 7.5 kHz is above the control rate of 5 kHz: the "
+                "controller would never read some of its samples; the nearest rate that would do is 5 kHz, "
+                "or raise the control rate (an average of n samples has 1/sqrt(n) of the noise)"
+            ),
+        ),
+        (
+            lambda: built(rate_hz=1.7e3, control_rate_hz=6e3),
+            ValueError,
+            (
+                "optical sensor: its sample rate of 1.7 kHz does not divide the control rate of 6 kHz "
+                "(into 3.52941 parts): its samples would fall between those of the controller; the nearest "
+                "rate that would do is 1.5 kHz"
+            ),
+        ),
+        (
+            lambda: built(delay_s=213e-6),
+            ValueError,
+            (
+                "optical sensor: its delay of 213 µs is no whole number of plant steps of 20 µs: it would "
+                "end inside a step; the nearest delay that would do is 220 µs, or choose a plant step that "
+                "divides it"
+            ),
+        ),
+        (lambda: built(plant_step_s=-2e-6), ValueError, "plant step is -2 µs; give a finite number above 0 s"),
+        (
+            lambda: QuadCell(0.9, -2e-10, 1e-9, 1e-13),
+            ValueError,
+            ("quad cell: background_power_w is -200 pW; give a finite number of at least 0 (0 W is a dark sky)"),
+        ),
+        (
+            lambda: QuadCell(0.0, 2e-10, 1e-9, 1e-13),
+            ValueError,
+            "quad cell: responsivity_a_w is 0 A/W; give a finite number above 0 A/W",
+        ),
+        (
+            lambda: QuadCell(0.9, 2e-10, 1e-9, math.nan),
+            ValueError,
+            (
+                "quad cell: thermal_noise_a_sqrt_hz is nan; give a finite number of at least 0 (0 leaves "
+                "shot noise alone)"
+            ),
+        ),
+        (
+            lambda: CELL.noise_lines(-3e-9, 2e3),
+            ValueError,
+            ("quad cell: received power is -3 nW; give a finite number of at least 0 (0 W is no light at all)"),
+        ),
+        (
+            lambda: AirySpot(1.55e-6, 0.05, -3e-6),
+            ValueError,
+            ("spot: source_angle_rad is -3 µrad; give a finite number of at least 0 (0 rad is a point source)"),
+        ),
+        (lambda: GaussianSpot(3e-3, 0.0), ValueError, "spot: focal_length_m is 0 m; give a finite number above 0 m"),
+        (
+            lambda: sensor.noise_equivalent_angle_rad(PAPER_SPOT, -2.5),
+            ValueError,
+            (
+                "noise-equivalent angle: the signal-to-noise ratio is -2.5, and a quad cell without light "
+                "has no angle; give a received power above 0 W"
+            ),
+        ),
+    ],
+)
+def test_a_refusal_of_a_sensor_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+UNLIKE = QuadCell(
+    responsivity_a_w=0.87, background_power_w=3.1e-10, dark_current_a=1.7e-9, thermal_noise_a_sqrt_hz=0.6e-13
+)
+WIDE = AirySpot(wavelength_m=1.48e-6, aperture_m=0.061, source_angle_rad=9e-6)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [line.value for line in UNLIKE.noise_lines(2.3e-9, 1700.0)], [1.04404255e-12, 3.83296743e-13, 1.92463825e-12, 4.94772675e-12]),
+    (lambda: [UNLIKE.signal_to_noise(2.3e-9, 1700.0), UNLIKE.signal_to_noise(0.0, 1700.0),
+            WIDE.per_noise_rad, GaussianSpot(2.1e-5, 0.37).per_noise_rad], [368.907167, 0.0, 1.47221973e-05, 3.55670228e-05]),
+    (lambda: [sensor.noise_equivalent_angle_line(UNLIKE, WIDE, 2.3e-9, 3100.0).value,
+            sensor.noise_equivalent_angle_rad(WIDE, 7.5), sensor.noise_bandwidth_hz(3100.0)], [3.81063129e-08, 1.96295964e-06, 1550.0]),
+])  # fmt: skip
+def test_light_on_a_cell_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [line.basis for line in UNLIKE.noise_lines(2.3e-9, 1700.0)],
+            [
+                "sqrt(2 q I B), I = responsivity x received power = 2.001 nA, B = 1.7 kHz",
+                "sqrt(2 q I B), I = responsivity x background = 269.7 pA, B = 1.7 kHz",
+                "sqrt(2 q I B), I = dark current of four cells = 6.8 nA, B = 1.7 kHz",
+                "sqrt(4 B) x density of one amplifier, B = 1.7 kHz",
+            ],
+        ),
+        (
+            lambda: [line.name for line in UNLIKE.noise_lines(2.3e-9, 1700.0)],
+            ["Signal shot noise", "Background shot noise", "Dark-current shot noise", "Thermal noise"],
+        ),
+        (
+            lambda: sensor.noise_equivalent_angle_line(UNLIKE, WIDE, 2.3e-9, 3100.0).basis,
+            (
+                "pi sqrt((3/16)^2 + (n/8)^2) (lambda/D) / SNRv, n = source angle / (lambda/D), lambda = "
+                "1.48 µm, D = 61 mm, source angle = 9 µrad (Tyler and Fried 1982); SNRv = 386.3 at 2.3 nW, "
+                "B = 1.55 kHz (half the sample rate)"
+            ),
+        ),
+        (
+            lambda: (
+                sensor.noise_equivalent_angle_line(
+                    UNLIKE, GaussianSpot(2.1e-5, 0.37), 2.3e-9, 3100.0, "a data sheet"
+                ).basis
+            ),
+            (
+                "W / (1.596 f SNRv), W = 21 µm at 1/e2, f = 370 mm; SNRv = 386.3 at 2.3 nW, B = 1.55 kHz "
+                "(half the sample rate)"
+            ),
+        ),
+    ],
+)
+def test_the_words_of_light_on_a_cell_say_each_of_its_numbers(found, expected):
+    assert found() == expected

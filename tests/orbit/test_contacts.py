@@ -947,23 +947,23 @@ def told(found):
         (
             lambda: [
                 x
-                for each in pass_spans(TILTED, StationRows.of(SITES, EPOCH), WHILE, 60.0, (9e6, 6e6))
+                for each in pass_spans(TILTED, StationRows.of(SITES, EPOCH), WHILE, 60.0, (5.1e6, 5.5e6))
                 for x in each.ravel()
             ],
             [
                 6315.74338,
-                7397.08677,
+                7313.30769,
                 13755.6482,
-                15259.806,
+                15134.5392,
                 21432.6856,
-                23133.1397,
+                22964.6491,
                 29222.225,
                 30000.0,
-                9985.52472,
+                10043.5031,
                 10804.6173,
-                17207.4114,
+                17293.8703,
                 18789.3837,
-                25059.4164,
+                25089.4202,
                 26543.4897,
             ],
         ),
