@@ -421,11 +421,14 @@ WIDE = AirySpot(wavelength_m=1.48e-6, aperture_m=0.061, source_angle_rad=9e-6)
 
 
 @pytest.mark.parametrize(("found", "expected"), [
-    (lambda: [line.value for line in UNLIKE.noise_lines(2.3e-9, 1700.0)], [1.04404255e-12, 3.83296743e-13, 1.92463825e-12, 4.94772675e-12]),
+    (lambda: [line.value for line in UNLIKE.noise_lines(2.3e-9, 1700.0)],
+     [1.04404255e-12, 3.83296743e-13, 1.92463825e-12, 4.94772675e-12]),
     (lambda: [UNLIKE.signal_to_noise(2.3e-9, 1700.0), UNLIKE.signal_to_noise(0.0, 1700.0),
-            WIDE.per_noise_rad, GaussianSpot(2.1e-5, 0.37).per_noise_rad], [368.907167, 0.0, 1.47221973e-05, 3.55670228e-05]),
+            WIDE.per_noise_rad, GaussianSpot(2.1e-5, 0.37).per_noise_rad],
+     [368.907167, 0.0, 1.47221973e-05, 3.55670228e-05]),
     (lambda: [sensor.noise_equivalent_angle_line(UNLIKE, WIDE, 2.3e-9, 3100.0).value,
-            sensor.noise_equivalent_angle_rad(WIDE, 7.5), sensor.noise_bandwidth_hz(3100.0)], [3.81063129e-08, 1.96295964e-06, 1550.0]),
+            sensor.noise_equivalent_angle_rad(WIDE, 7.5), sensor.noise_bandwidth_hz(3100.0)],
+     [3.81063129e-08, 1.96295964e-06, 1550.0]),
 ])  # fmt: skip
 def test_light_on_a_cell_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
