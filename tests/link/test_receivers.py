@@ -794,3 +794,271 @@ def test_a_search_without_a_root_asks_for_a_report(monkeypatch, rates):
     monkeypatch.setattr(OokCounting, "_ratio_of_counts", lambda self, counts, floor: np.full(counts.shape, 0.4))
     with pytest.raises(ArithmeticError, match="please report the receiver"):
         receiver.required_power_w(rates)
+
+
+LINE = {
+    "wavelength_m": 1.064e-6,
+    "bit_error_ratio": 3e-7,
+    "bandwidth_hz": 2.7e9,
+    "code_gain_db": 4.3,
+    "code_rate": 0.78,
+}
+DIODE = {
+    "quantum_efficiency": 0.67,
+    "thermal_noise_a_sqrt_hz": 1.7e-12,
+    "dark_current_a": 3e-9,
+    "background_power_w": 7e-10,
+}
+PHASED = {"quantum_efficiency": 0.67, "background_photons_per_mode": 0.023, "phase_error_rad": 0.07}
+KINDS_UNLIKE = {
+    "apd": OokApd(**LINE, **DIODE, extinction_ratio=17.0, gain=11.0, ionisation_ratio=0.31),
+    "pin": OokPin(**LINE, **DIODE, extinction_ratio=9.0),
+    "ook": OokCounting(
+        **LINE, detection_efficiency=0.43, dark_count_rate_hz=5e4, background_power_w=2e-13, extinction_ratio=31.0
+    ),
+    "ppm": PpmCounting(**LINE, detection_efficiency=0.43, dark_count_rate_hz=5e4, background_power_w=2e-13, order=8),
+    "amplified": OokPreamplified(
+        **LINE,
+        noise_figure_db=4.6,
+        gain_db=31.0,
+        optical_bandwidth_hz=17e9,
+        background_photons_per_mode=0.3,
+        extinction_ratio=23.0,
+        polarisations=1,
+    ),
+    "dpsk": DpskPreamplified(**LINE, noise_figure_db=3.7, background_photons_per_mode=0.3),
+    "bpsk homodyne": BpskHomodyne(**LINE, **PHASED),
+    "bpsk heterodyne": BpskHeterodyne(**LINE, **PHASED),
+    "qpsk homodyne": QpskHomodyne(**LINE, **PHASED, polarisations=2),
+    "qpsk heterodyne": QpskHeterodyne(**LINE, **PHASED),
+}
+
+
+def told_by(name):
+    """Power, photons, gain and symbols at a rate, the highest rate, the ratio at a power, and the noise there."""
+    r, rate = KINDS_UNLIKE[name], 155.52e6
+    found = [r.required_power_w(rate), r.photons_per_bit(rate), r.net_gain_db(rate), r.symbol_rate_hz(rate)]
+    found += [r.highest_data_rate_bit_s, r.bit_error_ratio_at(0.6 * found[0], rate)]
+    return [*map(float, found), *(line.value for line in r.noise_lines(2.3e-9, rate))]
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: told_by("apd"),
+     [
+        6.67975448e-09, 230.058958, 4.3, 199384615.0, 2106000000.0, 0.000667437212, 6.75602431e-09,
+        1.63857658e-09, 2.71189643e-09, 7.40388494e-09, 1.6973826e-08,
+    ]),
+    (lambda: told_by("pin"),
+     [
+        6.07607382e-08, 2092.67454, 4.3, 199384615.0, 2106000000.0, 0.00134586596, 2.75756803e-10,
+        9.19189344e-11, 1.13390086e-10, 3.09571981e-10, 1.6973826e-08,
+    ]),
+    (lambda: told_by("ook"),
+     [
+        4.43548682e-10, 15.276362, 4.3, 199384615.0, 2106000000.0, 5.79019175e-05, 7.17473106, 1.28861974,
+        0.0480657641, 0.0158357698,
+    ]),
+    (lambda: told_by("ppm"),
+     [
+        1.20375961e-10, 4.14589612, 4.3, 531692308.0, 789750000.0, 9.24853635e-05, 8.92781944, 0.0294341491,
+        0.00969738892,
+    ]),
+    (lambda: told_by("amplified"),
+     [
+        1.64903635e-09, 56.7948395, 4.3, 199384615.0, 2106000000.0, 0.000352252508, 8.16896271e-07,
+        1.70334647e-07, 6.45944368e-07, 1.23346229e-08, 2.57194667e-09, 1.38135949e-08,
+    ]),
+    (lambda: told_by("dpsk"),
+     [
+        2.27508723e-10, 7.83568017, 4.3, 199384615.0, 2106000000.0, 9.24401741e-05, 9.53720955, 1.04094208,
+    ]),
+    (lambda: told_by("bpsk homodyne"),
+     [
+        1.03908554e-10, 3.57873837, 4.3, 199384615.0, 2106000000.0, 5.52168985e-05, 0.5, 0.0877781294,
+    ]),
+    (lambda: told_by("bpsk heterodyne"),
+     [
+        2.07817108e-10, 7.15747674, 4.3, 199384615.0, 2106000000.0, 5.52168985e-05, 0.707106781, 0.124137021,
+    ]),
+    (lambda: told_by("qpsk homodyne"),
+     [
+        2.37291889e-10, 8.17262442, 4.3, 49846153.8, 8424000000.0, 3.37789053e-05, 0.5, 0.0620685105,
+    ]),
+    (lambda: told_by("qpsk heterodyne"),
+     [
+        2.40893063e-10, 8.29665328, 4.3, 99692307.7, 4212000000.0, 3.37789053e-05, 0.707106781, 0.124137021,
+    ]),
+    (lambda: [background_power_w(3.1e6, 0.023, 0.0017, 2.3e-9), background_photons_per_mode(3.1e6,
+            1.3e-6), apd_excess_noise_factor(17.0, 0.23)],
+     [3.72224526e-10, 9.66386878e-08, 5.40470588]),
+])  # fmt: skip
+def test_receivers_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [
+                f"{line.name}: {line.basis} | {line.regime}"
+                for line in KINDS_UNLIKE["apd"].noise_lines(2.3e-9, 155.52e6)
+            ],
+            [
+                "Signal shot noise, marks: sqrt(2 e M^2 F R P B) | Gaussian noise in 0.5 of the symbol rate",
+                ("Signal shot noise, spaces: sqrt(2 e M^2 F R P B) | Gaussian noise in 0.5 of the symbol rate"),
+                "Background shot noise: sqrt(2 e M^2 F R P B) | Gaussian noise in 0.5 of the symbol rate",
+                "Dark current shot noise: sqrt(2 e M^2 F I B) | Gaussian noise in 0.5 of the symbol rate",
+                "Thermal noise: density sqrt(B) | Gaussian noise in 0.5 of the symbol rate",
+            ],
+        ),
+        (
+            lambda: [f"{line.name}: {line.basis}" for line in KINDS_UNLIKE["amplified"].noise_lines(2.3e-9, 155.52e6)],
+            [
+                "Signal-ASE beat noise, marks: sqrt(4 I S B), S in A/Hz",
+                "Signal-ASE beat noise, spaces: sqrt(4 I S B), S in A/Hz",
+                "ASE-ASE beat noise: sqrt(2 p S^2 B (Bo - B/2)), S in A/Hz",
+                "Signal shot noise, marks: sqrt(2 e I B)",
+                "Signal shot noise, spaces: sqrt(2 e I B)",
+                "ASE shot noise: sqrt(2 e p S Bo B), S in A/Hz",
+            ],
+        ),
+        (
+            lambda: [
+                f"{line.name}: {line.basis} | {line.regime}"
+                for line in KINDS_UNLIKE["qpsk homodyne"].noise_lines(2.3e-9, 155.52e6)
+            ],
+            [
+                (
+                    "Shot noise of the local oscillator: 1/2 | quadrature of the field, in which the signal is "
+                    "sqrt(q n / 4); matched filter"
+                ),
+                (
+                    "Background beat noise: sqrt(q N / 4) | quadrature of the field, in which the signal is "
+                    "sqrt(q n / 4); matched filter"
+                ),
+            ],
+        ),
+        (
+            lambda: [
+                f"{line.name}: {line.basis} | {line.regime}"
+                for line in KINDS_UNLIKE["bpsk heterodyne"].noise_lines(2.3e-9, 155.52e6)
+            ],
+            [
+                (
+                    "Shot noise of the local oscillator: sqrt(1 / 2) | quadrature of the field, in which the "
+                    "signal is sqrt(q n); matched filter"
+                ),
+                (
+                    "Background beat noise: sqrt(q N) | quadrature of the field, in which the signal is sqrt(q "
+                    "n); matched filter"
+                ),
+            ],
+        ),
+        (
+            lambda: [
+                f"{line.name} ({line.unit}): {line.basis} | {line.regime}"
+                for line in KINDS_UNLIKE["dpsk"].noise_lines(2.3e-9, 155.52e6)
+            ],
+            [
+                (
+                    "Signal-ASE beat noise (photon): sqrt(n N) | matched filter; product of the fields of two "
+                    "symbols, so not Gaussian"
+                ),
+                (
+                    "ASE-ASE beat noise (photon): N / sqrt 2 | matched filter; product of the fields of two "
+                    "symbols, so not Gaussian"
+                ),
+            ],
+        ),
+        (
+            lambda: [
+                f"{line.name} ({line.unit}): {line.basis} | {line.regime}"
+                for line in KINDS_UNLIKE["ppm"].noise_lines(2.3e-9, 155.52e6)
+            ],
+            [
+                ("Signal shot noise, pulse (count): sqrt(mean counts in a slot) | Poisson counts, no dead time"),
+                "Background shot noise (count): sqrt(mean counts in a slot) | Poisson counts, no dead time",
+                "Dark counts (count): sqrt(mean counts in a slot) | Poisson counts, no dead time",
+            ],
+        ),
+    ],
+)
+def test_noise_of_receivers_has_its_names_and_formulas(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: KINDS_UNLIKE["ppm"].required_power_w([1e8, 0.9e9]),
+            RateError,
+            (
+                "the data rate is 900 Mbit/s, which is 3.077 GHz of symbols or slots on the line: the "
+                "receiver takes 2.7 GHz, so at most 789.8 Mbit/s of data"
+            ),
+        ),
+        (
+            lambda: KINDS_UNLIKE["amplified"].required_power_w(2.2e9),
+            RateError,
+            (
+                "the data rate is 2.2 Gbit/s, which is 2.821 GHz of symbols or slots on the line: the "
+                "receiver takes 2.7 GHz, so at most 2.106 Gbit/s of data"
+            ),
+        ),
+        (
+            lambda: replace(KINDS_UNLIKE["qpsk heterodyne"], phase_error_rad=0.31),
+            ValueError,
+            (
+                "QpskHeterodyne.phase_error_rad is 0.31 rad: no power reaches a bit error ratio of 3e-07 "
+                "above 0.157 rad rms"
+            ),
+        ),
+        (
+            lambda: replace(KINDS_UNLIKE["ppm"], order=12),
+            ValueError,
+            "the order of the pulse-position modulation is 12: it is a power of two above 1",
+        ),
+        (
+            lambda: replace(KINDS_UNLIKE["ppm"], code_gap_db=1.5),
+            ValueError,
+            "code_gain_db stands beside code_gap_db: a code has one of both",
+        ),
+        (
+            lambda: replace(KINDS_UNLIKE["apd"], ionisation_ratio=1.25),
+            ValueError,
+            (
+                "OokApd.ionisation_ratio is 1.25: it must be finite, at least 0, at most 1; take the "
+                "inverse when the other carrier starts the avalanche"
+            ),
+        ),
+        (
+            lambda: KINDS_UNLIKE["pin"].required_power_w(-1.5e8),
+            ValueError,
+            "the data rate is -150 Mbit/s: it must be finite, above 0 bit/s",
+        ),
+        (
+            lambda: KINDS_UNLIKE["pin"].bit_error_ratio_at(-1.5e-9, 1e8),
+            ValueError,
+            "the received power is -1.5 nW: it must be finite, at least 0 W",
+        ),
+        (
+            lambda: background_power_w(3.1e6, 0.023, 3.25, 2.3e-9),
+            ValueError,
+            (
+                "the field of view is 3.25 rad: it must be finite, at least 0 rad, at most 3.142 rad; it "
+                "is the full angle, up to pi rad (a half space)"
+            ),
+        ),
+        (
+            lambda: apd_excess_noise_factor(0.75, 0.23),
+            ValueError,
+            "the gain of the avalanche photodiode is 0.75: it must be finite, at least 1",
+        ),
+    ],
+)
+def test_a_refusal_of_a_receiver_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
