@@ -339,3 +339,96 @@ def test_a_peak_above_the_lossless_beams_is_refused():
 
 def test_the_far_field_begins_at_twice_the_squared_aperture_over_the_wavelength():
     assert gains.far_field_m(0.15, 1.55e-6) == pytest.approx(29.032e3, rel=1e-4)
+
+
+SHAPED = LitAperture(0.061, 1.31e-6, 0.83, 0.27, 1.4)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [SHAPED.efficiency, SHAPED.passed, SHAPED.gain_db, SHAPED.half_angle_rad],
+     [0.585000434, 0.652305277, 98.0531694, 2.74150793e-05]),
+    (lambda: SHAPED.loss_db([0.0, 3e-6, 11e-6, 40e-6, 9e-4]),
+     [0.0, 0.104230981, 1.44046687, 21.8700873, 66.3577295]),
+    (lambda: [SHAPED.error_rad(loss) for loss in (0.0, 0.4, 3.0, 17.0)],
+     [0.0, 5.85926781e-06, 1.56136871e-05, 3.13448258e-05]),
+    (lambda: [GaussianFall(17e-6).error_rad(2.3), GaussianFall(17e-6).error_rad(-1.0),
+            *GaussianFall(17e-6).loss_db([5e-6, -9e-6])],
+     [8.74793779e-06, 0.0, 0.751374536, 2.4344535]),
+    (lambda: [gains.aperture_gain_db(0.23, 1.31e-6), gains.gaussian_beam_gain_db(17e-6),
+            gains.free_space_loss_db(3.7e7, 1.31e-6), gains.far_field_m(0.23, 1.31e-6)],
+     [114.832128, 104.421921, 291.002806, 80763.3588]),
+    (lambda: [gains.peak_radiant_intensity_w_sr(2.3, 17e-6), gains.implied_transmission_db(3.1e9, 2.3,
+            17e-6)],
+     [5066524140.0, -2.13348422]),
+    (lambda: [float(gains.pointing_loss_db(3e-6, 0.061, 1.31e-6, each)) for each in ("gaussian", "gain")],
+     [0.418228524, 0.836457048]),
+    (lambda: [gains.strehl_loss_db(0.37, "ratio"), gains.strehl_loss_db(0.37, "decibel"),
+            gains.strehl_ratio(83e-9, 1.31e-6), gains.obscuration_loss_db(0.27)],
+     [4.31798276, 0.37, 0.853440385, 0.328734189]),
+    (lambda: [gains.air_mass(0.31), gains.clear_sky_loss_db(0.87, 0.31), gains.rayleigh_depth(0.85e-6,
+            830.0), gains.aerosol_depth(0.85e-6, 0.12, 1.3)],
+     [3.2480476, 1.96444347, 0.0151134589, 0.148230182]),
+    (lambda: [gains.photon_energy_j(1.31e-6) * 1e19, gains.dbm(0.023), gains.watt(-47.3)],
+     [1.51637088, 13.6172784, 1.86208714e-08]),
+])  # fmt: skip
+def test_beams_and_gains_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: gains.implied_transmission_db(6.1e9, 2.3, 17e-6),
+            ValueError,
+            (
+                "a peak of 6.1e+09 W/sr is not above 0 and at most 5.067e+09 W/sr, which 2.3 W in a half "
+                "angle of 17 µrad at 1/e2 reach without loss; check the convention of the divergence"
+            ),
+        ),
+        (
+            lambda: gains.pointing_loss_db(3e-6, 0.061, 1.31e-6, "pattern"),
+            ValueError,
+            'pointing-loss convention "pattern" is neither "gaussian" nor "gain"',
+        ),
+        (
+            lambda: gains.strehl_loss_db(1.25, "ratio"),
+            ValueError,
+            "the Strehl ratio is 1.25: it must be finite, above 0, at most 1; 1 is a perfect wavefront",
+        ),
+        (
+            lambda: gains.strehl_loss_db(0.37, "percent"),
+            ValueError,
+            'Strehl convention "percent" is neither "decibel" nor "ratio"',
+        ),
+        (
+            lambda: gains.clear_sky_loss_db(1.25, 0.31),
+            ValueError,
+            "the transmission is 1.25: it must be finite, above 0, at most 1; 1 is vacuum",
+        ),
+        (
+            lambda: gains.obscuration_loss_db(1.5),
+            ValueError,
+            "the obscuration is 1.5: it must be finite, at least 0 and below 1; 1 is the whole aperture",
+        ),
+        (
+            lambda: gains.air_mass(-0.31),
+            ValueError,
+            "an elevation of -17.7617 deg is not between 0 and 90 deg, horizon and zenith",
+        ),
+        (
+            lambda: LitAperture(0.061, 1.31e-6, 9.5, 0.9),
+            ValueError,
+            ("truncation is 9.5: it must be finite, at most 1.68603; an obscuration of 0.9 stops the rest of the beam"),
+        ),
+        (
+            lambda: LitAperture(0.061, 1.31e-6, 0.83, 0.27, 0.75),
+            ValueError,
+            "LitAperture.m_squared is 0.75: it must be finite, at least 1; 1 is an ideal beam",
+        ),
+    ],
+)
+def test_a_refusal_of_a_gain_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
