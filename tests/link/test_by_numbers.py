@@ -112,3 +112,124 @@ def test_numbers_are_taken_from_the_least_to_the_most_that_a_quantity_has(size):
         ValueError, match=re.escape(f"the power is {beyond:g} W: nothing is below {LEAST:g} or above {MOST:g}")
     ):
         received_power(**GIVEN | {"power_w": beyond})
+
+
+def lines_of(*given, **more):
+    return [
+        f"{x.name} {x.value:.4f} {x.unit}: {x.basis} | {x.source} | {x.regime} | {x.warning}"
+        for x in received_power(*given, **more).lines
+    ]
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: lines_of(
+                2.3, 17e-6, 3.7e7, 0.23, 1.31e-6, pointing_error_rad=5e-6, losses_db={"optics": 1.25, "Strehl": 0.5}
+            ),
+            [
+                "Power 33.6173 dBm: 10 log10(P / 1 mW) | given |  | ",
+                "Transmit gain 104.4219 dB: G = 8 / theta^2 | theta = 17 µrad at 1/e2 | far field | ",
+                ("Pointing loss -0.7514 dB: exp(-2 (error / theta)^2) | given | Gaussian beam, static error | "),
+                "Free space -291.0028 dB: (lambda / (4 pi d))^2 | given | far field | ",
+                "Receive gain 114.8321 dB: (pi D / lambda)^2 | given | on axis, uniformly filled | ",
+                "optics -1.2500 dB: given | given |  | ",
+                "Strehl -0.5000 dB: given | given |  | ",
+            ],
+        ),
+        (
+            lambda: lines_of(2.3, 17e-6, 3.1e3, 0.23, 1.31e-6)[1:3],
+            [
+                (
+                    "Transmit gain 104.4219 dB: G = 8 / theta^2 | theta = 17 µrad at 1/e2 | far field | the "
+                    "far field of this beam begins at 3.674 km"
+                ),
+                ("Pointing loss 0.0000 dB: exp(-2 (error / theta)^2) | given | Gaussian beam, static error | "),
+            ],
+        ),
+    ],
+)
+def test_a_beam_by_numbers_has_every_line_with_its_words(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: received_power(2.3, 17e-6, -3.7e7, 0.23, 1.31e-6),
+            ValueError,
+            "the distance is -37000 km: it must be finite, above 0 m",
+        ),
+        (
+            lambda: received_power(2.3, 17e-6, 3.7e7, 0.23, 1.31e-6, pointing_error_rad=-5e-6),
+            ValueError,
+            "the pointing error is -5 µrad: it must be finite, at least 0 rad",
+        ),
+        (
+            lambda: received_power(2.3, 17e-6, 3.7e7, 0.23, 1.31e-6, losses_db={"optics": 1.25, "Strehl": -0.5}),
+            ValueError,
+            "the loss 'Strehl' is -0.5 dB: it must be finite, at least 0 dB; a loss is positive",
+        ),
+        (
+            lambda: received_power(2.3e31, 17e-6, 3.7e7, 0.23, 1.31e-6),
+            ValueError,
+            "the power is 2.3e+31 W: nothing is below 1e-30 or above 1e+30 in SI units",
+        ),
+        (
+            lambda: received_power(2.3, 17e-6, 3.7e7, 0.0, 1.31e-6),
+            ValueError,
+            "the receiving aperture is 0 m: it must be finite, above 0 m",
+        ),
+        (
+            lambda: received_power(2.3, 17e-6, 3.7e7, 0.23, math.inf),
+            ValueError,
+            "the wavelength is inf m: it must be finite, above 0 m",
+        ),
+        (
+            lambda: scan_times(1e-4, 2e-5, 5e-3, overlap=0.0),
+            ValueError,
+            (
+                "the overlap is 0: it must be finite, above 0 and below 1; without overlap some targets "
+                "are never lit long enough"
+            ),
+        ),
+        (
+            lambda: scan_times(1e-4, 2e-5, -5e-3),
+            ValueError,
+            "the detection time is -5 ms: it must be finite, above 0 s",
+        ),
+        (
+            lambda: scan_times(1e-4, 2e-5, 5e-3, jitter_rms_rad=-1e-6),
+            ValueError,
+            "the jitter is -1 µrad: it must be finite, at least 0 rad",
+        ),
+        (
+            lambda: scan_times(1e-4, 2e-5, 5e-3, coverage=1.0),
+            ValueError,
+            "Search.coverage is 1: it must be finite, above 0 and below 1; Gaussian errors have no edge",
+        ),
+        (
+            lambda: scan_times(1e-4, 2e-5, 5e-3, detection_probability=1.25),
+            ValueError,
+            "Detector.probability is 1.25: it must be finite, above 0, at most 1",
+        ),
+    ],
+)
+def test_a_refusal_of_a_number_says_it_and_its_bounds(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [(t := scan_times(9e-5, 2.3e-5, 4e-3, coverage=0.97, overlap=0.31)).probability, t.mean_s,
+            t.std_s, t.quantile(0.5)],
+     [0.970458911, 0.187486704, 0.166866236, 0.144207954]),
+    (lambda: [(t := scan_times(9e-5, 2.3e-5, 4e-3, coverage=0.9, overlap=0.31, detection_probability=0.7,
+            jitter_rms_rad=3e-6)).probability, t.mean_s, t.quantile(0.5)],
+     [0.641659612, 0.156883098, 0.256167965]),
+])  # fmt: skip
+def test_searches_by_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)

@@ -350,3 +350,41 @@ def test_fades_of_an_end_beside_one_that_hardly_moves_are_its_own():
 def test_what_takes_no_light_is_refused(made, said):
     with pytest.raises(ValueError, match=said):
         made()
+
+
+LENS = Pupil(0.17, 1.31e-6, 0.28, Aberrations(40e-9, -30e-9, 55e-9, 25e-9), 0.93, 0.07, 0.96)
+FIBRE, SPOT = SingleModeFibre(LENS, 0.7 * URAD), Disk(replace(LENS, truncation=0.0, shift=0.0), -0.9 * URAD, 6.0 * URAD)
+FEW = Losses.of(np.array([3.0, 0.5, 1.25]), np.array([2.0, 1.0, 5.0]))
+MORE = Losses.of(np.array([0.25, 2.0]), np.array([3.0, 1.0]))
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [*FIBRE.share([0.0, 1e-6, -2e-6], [0.0, 2e-6, 1e-6]), FIBRE.worst_loss_db(2e-6),
+            FIBRE.error_rad(1.5)],
+     [0.526702729, 0.43207465, 0.447896989, 3.53173061, 3.02667635e-06]),
+    (lambda: [*SPOT.share([0.0, 5e-6, -7e-6], [0.0, 2e-6, 1e-6]), SPOT.worst_loss_db(5e-6),
+            SPOT.error_rad(1.5)],
+     [0.492292349, 0.355217719, 0.123883891, 6.56165172, 4.07380898e-06]),
+    (lambda: [coupling.best_truncation(0.28), coupling.truncation_of_mode(LENS, 5.1e-6, 0.8),
+            coupling.turbulent_share(0.93, 1.7), LENS.open_area, LENS.per_rad],
+     [1.0378635, 1.29950421, 0.297832487, 0.4608, 407687.596]),
+    (lambda: [coupling.narrowed(replace(LENS, stop=1.0), 0.09, 0.8).stop, coupling.narrowed(replace(LENS,
+            stop=1.0), 0.2, 0.8).stop],
+     [0.850510394, 1.0]),
+    (lambda: LENS.aberrations.wavefront_m(np.array([0.3, 0.9]), np.array([0.4, 2.5])),
+     [-1.07351535e-07, -1.78786871e-08]),
+    (lambda: [*FEW.loss_db, *FEW.share, *FEW.beyond([0.0, 0.5, 1.0, 2.0, 4.0]), FEW.mean_db,
+            FEW.moved(1.5).mean_db],
+     [
+        0.5, 1.25, 3.0, 0.125, 0.625, 0.25, 1.0, 0.9375, 0.6875, 0.375, 0.0, 1.51572514, 3.01572514,
+    ]),
+    (lambda: [(b := BothEnds(FEW, MORE)).beyond(1.6), b.quantile_db(0.2), b.quantile_db(0.7), b.mean_db,
+            *b.sum.loss_db, *b.sum.share],
+     [
+        0.653125, 3.25, 1.425, 2.1416246, 0.75, 1.5, 2.5, 3.25, 3.25, 5.0, 0.09375, 0.46875, 0.03125, 0.15625,
+        0.1875, 0.0625,
+    ]),
+    (lambda: [coupling.of_jitter(FIBRE, Jitter((0.4e-6, -0.9e-6), (1.1e-6, 0.6e-6))).mean_db], [0.413202201]),
+])  # fmt: skip
+def test_ends_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)

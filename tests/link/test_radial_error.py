@@ -9,7 +9,14 @@ from scipy.integrate import quad
 from scipy.special import erfc
 from scipy.stats import ncx2, norm
 
-from microrad.link.radial_error import Jitter, density_on_circle, radial_cdf, radial_quantile, radial_survival
+from microrad.link.radial_error import (
+    Jitter,
+    density_on_circle,
+    radial_cdf,
+    radial_quantile,
+    radial_steps,
+    radial_survival,
+)
 
 URAD = 1e-6
 EQUAL = Jitter((0.0, 0.0), (3.0 * URAD, 3.0 * URAD))
@@ -204,3 +211,31 @@ def test_directions_on_a_circle_belong_to_their_axes(bias, rms):
     exact = np.sum(weight * np.cos(angle) ** 2, axis=1) / np.sum(weight, axis=1)
     np.testing.assert_allclose(np.sum(square_x * density, axis=1) / np.sum(density, axis=1), exact, rtol=1e-9)
     np.testing.assert_allclose(square_x + square_y, 1.0, rtol=1e-12)
+
+
+SKEW = Jitter((1.3 * URAD, -2.6 * URAD), (0.9 * URAD, 2.1 * URAD))
+LINE = Jitter((1.3 * URAD, -2.6 * URAD), (2.1 * URAD, 0.0))
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [SKEW.static_rad, *radial_survival(SKEW, [0.0, 1e-6, 4e-6, 9e-6]), *radial_cdf(SKEW,
+            [0.3e-6, 4e-6])],
+     [
+        2.90688837e-06, 1.0, 0.950348233, 0.312543163, 0.00147980036, 0.00396074478, 0.687456837,
+    ]),
+    (lambda: [*radial_quantile(SKEW, [1e-6, 0.02, 0.9]), *radial_quantile(LINE, [1e-6, 0.02, 0.9])],
+     [
+        1.26956384e-05, 7.11351443e-06, 1.37208562e-06, 1.15783324e-05, 6.20491851e-06, 2.61956236e-06,
+    ]),
+    (lambda: [*radial_survival(LINE, [2e-6, 3e-6, 6e-6]), *radial_cdf(LINE, [2.7e-6, 6e-6])],
+     [1.0, 0.554166101, 0.0259396996, 0.225574295, 0.9740603]),
+    (lambda: [float(np.sum(density_on_circle(SKEW, np.array(3e-6))[2])),
+            *(float(np.sum(each * density_on_circle(SKEW,
+            np.array(3e-6))[2])) for each in density_on_circle(SKEW, np.array(3e-6))[:2])],
+     [241645.417, 79492.7792, 162152.638]),
+    (lambda: [(s := radial_steps(SKEW))[0].size, float(s[0] @ s[1]), float(s[0] ** 2 @ s[1]),
+            float(s[1].sum()), float(s[0][-1]), *radial_steps(Jitter((3e-6, 4e-6), (0.0, 0.0)))[0]],
+     [4000, 3.322226e-06, 1.36700041e-11, 1.0, 2.8103375e-05, 5e-06]),
+])  # fmt: skip
+def test_probabilities_of_axes_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)

@@ -9,7 +9,17 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.special import j1, jv
 
-from microrad.link.turbulence import BuftonWind, Downlink, GammaGamma, HufnagelValley, LogNormal, SlantPath, Uplink
+from microrad.link.turbulence import (
+    BuftonWind,
+    Downlink,
+    GammaGamma,
+    HufnagelValley,
+    LogNormal,
+    SlantPath,
+    Uplink,
+    Wandering,
+    seeing,
+)
 
 ZENITH = SlantPath(HufnagelValley(), 0.5e-6, math.pi / 2.0, 500e3)
 LOW = SlantPath(HufnagelValley(ground_strength=5e-15, wind_rms_m_s=18.0), 1.55e-6, math.radians(35.0), 900e3)
@@ -246,3 +256,49 @@ def test_a_path_says_where_the_closed_forms_end():
 def test_what_cannot_be_is_refused(call, said):
     with pytest.raises(ValueError, match=said.replace("(", r"\(")):
         call()
+
+
+UNLIKE_AIR = SlantPath(HufnagelValley(ground_strength=3.3e-15, wind_rms_m_s=16.0, ground_m=830.0), 1.31e-6, 0.71, 1.3e6)
+UNLIKE_WIND = BuftonWind(ground_m_s=3.7, jet_m_s=27.0, peak_m=8.6e3, width_m=4.1e3, slew_rad_s=1.3e-3)
+UNLIKE_FADES = {
+    "log-normal": LogNormal(0.37),
+    "gamma-gamma": GammaGamma(4.3, 2.7),
+    "wandering": Wandering(GammaGamma(4.3, 2.7), 3.1),
+}
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: UNLIKE_AIR.profile.strength(np.array([0.0, 100.0, 3e3, 11e3])),
+     [3.45525806e-15, 1.35924716e-15, 2.13194596e-17, 8.25679443e-18]),
+    (lambda: [UNLIKE_AIR.fried_m, UNLIKE_AIR.isoplanatic_rad, UNLIKE_AIR.rytov,
+            UNLIKE_AIR.spherical_rytov, UNLIKE_AIR.greenwood_hz(UNLIKE_WIND)],
+     [0.25849845, 1.63494088e-05, 0.0846778895, 0.0840466689, 20.0622284]),
+    (lambda: [*UNLIKE_WIND.speed_m_s(np.array([0.0, 5e3, 8.6e3, 2e4])), UNLIKE_WIND.rms_m_s],
+     [4.03156707, 22.6892366, 41.88, 29.7118518, 32.1757363]),
+    (lambda: [(down := Downlink(UNLIKE_AIR)).index(0.23), down.index(0.0), down.arrival_rms_rad(0.23,
+            "gradient"), down.arrival_rms_rad(0.23, "zernike")],
+     [0.0137316162, 0.0842600998, 2.1303674e-06, 2.20228803e-06]),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz(np.array([0.3, 7.0, 120.0]), 0.23, UNLIKE_WIND,
+            "gradient"),
+     [1.79385041e-12, 9.14432065e-14, 1.17356785e-16]),
+    (lambda: [(up := Uplink(UNLIKE_AIR, 0.043)).index(), up.spread_db, up.radius_m,
+            up.wander_rms_rad("dios-2004"), up.wander_rms_rad("itu-r-p1622"),
+            up.anisoplanatic_rad2(31e-6)],
+     [0.0333139956, 1.30527957, 12.6066253, 2.33180128e-06, 3.00329528e-06, 2.90468741]),
+    (lambda: [x for each in UNLIKE_FADES.values() for x in each.below([0.1, 0.6, 1.9])],
+     [
+        6.58374413e-05, 0.264382352, 0.922849321, 0.0175470639, 0.381859297, 0.88162052, 0.0254784876,
+        0.404972018, 0.875084507,
+    ]),
+    (lambda: [x for each in UNLIKE_FADES.values() for x in (each.loss_db(0.003), each.loss_db(0.7))],
+     [7.37922994, -0.594224542, 13.3668452, -0.689419285, 14.4221862, -0.655269772]),
+    (lambda: [(g := GammaGamma.of_plane_wave(1.7)).large, g.small, g.index,
+            GammaGamma.of_index(0.9).large, GammaGamma.of_index(0.9).small],
+     [4.00938237, 1.8485284, 0.925312069, 2.7057312, 2.58210663]),
+    (lambda: [seeing.residual(n) for n in (0, 1, 3, 7, 33)], [1.0299, 1.0299, 0.134, 0.0587, 0.0142516831]),
+    (lambda: [seeing.encircled(7e-6, 0.31, 1.31e-6, 0.12, tilt_taken_out=False), seeing.encircled(7e-6,
+            0.31, 1.31e-6, 0.12, tilt_taken_out=True)],
+     [0.493305251, 0.680340572]),
+])  # fmt: skip
+def test_air_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
