@@ -911,3 +911,252 @@ def test_what_lies_across_a_mean_of_tens_of_sigma_still_makes_it_longer(sigmas):
     wanted = stats.ncx2.ppf(P, 2, sigmas**2) ** 0.5
     assert wanted - along > 0.01
     assert alone(off, (0, 1)).quantile(P) == pytest.approx(wanted, rel=1e-6)
+
+
+def asked(kind="APE", window_s=None, spacing_s=None, **more):
+    return Requirement(ErrorIndex(kind, window_s, spacing_s), **{"axes": (0,)} | more)
+
+
+PAIR = two()
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda: asked(confidence=1.25), ValueError, "a confidence of 1.25: give a share above 0 and below 1"),
+        (
+            lambda: asked(interpretation="worst"),
+            ValueError,
+            'no interpretation "worst"; give one of temporal, ensemble, mixed',
+        ),
+        (
+            lambda: asked(axes=(1, 1)),
+            ValueError,
+            "axes (1, 1): give one, or two for the radial error, by their places from 0",
+        ),
+        (
+            lambda: asked(axes=(0, 1, 2)),
+            ValueError,
+            "axes (0, 1, 2): give one, or two for the radial error, by their places from 0",
+        ),
+        (lambda: asked(limit_rad=-2.5e-6), ValueError, "a limit of -2.5e-06 rad; give a finite one above zero"),
+        (lambda: asked("PDE", 2.0, 7.0), ValueError, "PDE needs observation_s: give the time in s"),
+        (lambda: asked("APE", observation_s=3.0), ValueError, "APE has no observation_s: leave it out"),
+        (
+            lambda: asked("PDE", 2.0, 7.0, observation_s=8.5),
+            ValueError,
+            "PDE: both windows have to lie in the observation period of 8.5 s; give it longer",
+        ),
+        (
+            lambda: asked("PRE", 2.0, 7.0, observation_s=8.5),
+            ValueError,
+            "PRE: its windows lie in two observation periods of 8.5 s; space them wider",
+        ),
+        (
+            lambda: contributions([source("random"), replace(source("random", gains=np.ones(3)), name="b")], asked()),
+            ValueError,
+            "b has gains for 3 axes, and a random error for 1; give all as many",
+        ),
+        (
+            lambda: contributions([source("random"), source("random", 2.0)], asked()),
+            ValueError,
+            "two sources have one name; give each its own",
+        ),
+        (
+            lambda: contributions(PAIR, asked(axes=(2,))),
+            ValueError,
+            "axis 2 is asked for, and the sources have 1 from 0 on",
+        ),
+        (
+            lambda: contribution(source("drift", period_s=3.0), asked("RPE", 3.5)),
+            ValueError,
+            (
+                "a drift error: RPE looks at 3.5 s, and it begins anew every 3 s; give shorter times, or "
+                "the class that it has over many periods"
+            ),
+        ),
+        (lambda: budget([], [asked()]), ValueError, "a budget without a source: give one or more"),
+        (
+            lambda: Spread("normal", 1.0, 2.0),
+            ValueError,
+            'no shape "normal" of a spread; give one of fixed, gaussian, uniform',
+        ),
+        (
+            lambda: Spread("uniform", 1.0, -2.0),
+            ValueError,
+            "a spread of mean 1 and width -2: give finite ones, the width >= 0",
+        ),
+        (
+            lambda: Spread("fixed", 1.0, 2.5),
+            ValueError,
+            'a fixed size has no width, and 2.5 is given: say "gaussian" or "uniform"',
+        ),
+        (
+            lambda: source("ramp"),
+            ValueError,
+            (
+                'a ramp error: no class "ramp"; give one of constant, per-observation, random, process, '
+                "periodic, drift, transient"
+            ),
+        ),
+        (lambda: source("drift"), ValueError, "a drift error: a drift error needs period_s; give it"),
+        (
+            lambda: source("random", period_s=3.0),
+            ValueError,
+            "a random error: a random error has no period_s; leave it out",
+        ),
+        (
+            lambda: source("periodic", freq_hz=-2.5),
+            ValueError,
+            "a periodic error: freq_hz is -2.5; give a finite number above zero",
+        ),
+        (
+            lambda: source("process"),
+            ValueError,
+            "a process error: a spectrum belongs to a process, and to nothing else",
+        ),
+        (
+            lambda: source("random", -2.5),
+            ValueError,
+            "a random error: a random error of size -2.5; give a size of 0 or above",
+        ),
+        (
+            lambda: source("random", gains=np.ones((2, 3))),
+            ValueError,
+            "a random error: its gains have the shape (2, 3); give a finite one for each axis",
+        ),
+        (
+            lambda: source(
+                "constant", gains=lti.StateSpace(np.array([[0.25]]), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)))
+            ),
+            ValueError,
+            "a constant error: its transfer has a pole of 0.25 rad/s; give a stable system of one input",
+        ),
+        (
+            lambda: source(
+                "constant",
+                gains=lti.StateSpace(np.array([[-0.25]]), np.ones((1, 2)), np.ones((1, 1)), np.zeros((1, 2))),
+            ),
+            ValueError,
+            "a constant error: its transfer has 2 inputs; give a stable system of one input",
+        ),
+        (
+            lambda: budget(PAIR, [asked()], [Correlation("a", "c", 0.5)]),
+            ValueError,
+            "correlation of a and c: name two sources out of a, b",
+        ),
+        (
+            lambda: budget(PAIR, [asked()], [Correlation("a", "b", -1.5)]),
+            ValueError,
+            "correlation of a and b: the coefficient is -1.5; give one from -1 to 1",
+        ),
+        (
+            lambda: budget(PAIR, [asked()], [Correlation("a", "b", 0.5), Correlation("b", "a", 0.25)]),
+            ValueError,
+            "two correlations are of the same sources; give each pair once",
+        ),
+        (
+            lambda: budget(
+                [*PAIR, replace(PAIR[0], name="c")],
+                [asked()],
+                [Correlation("a", "b", 0.9), Correlation("b", "c", 0.9), Correlation("a", "c", -0.9)],
+            ),
+            ValueError,
+            (
+                "correlations of a, b, c: their matrix has the eigenvalue -0.8, so that no errors can be "
+                "correlated so; give a positive semidefinite one"
+            ),
+        ),
+        (
+            lambda: budget(
+                [replace(each, kind="constant", size=Spread("gaussian", 0.0, 1.0)) for each in PAIR],
+                [asked(interpretation="ensemble")],
+                [Correlation("a", "b", 0.5)],
+            ),
+            ValueError,
+            (
+                "correlation of a and b: the sizes of correlated constants have no common distribution "
+                "here; take the interpretation temporal or mixed"
+            ),
+        ),
+        (
+            lambda: budget(
+                [PAIR[0], replace(PAIR[1], kind="constant", size=Spread("gaussian", 0.0, 1.0))],
+                [asked()],
+                [Correlation("a", "b", 0.5)],
+            ),
+            ValueError,
+            (
+                "correlation of a and b: only two Gaussian errors of one class, random or constant, that "
+                "reach the axes by gains and alike have one; state the common cause as a source of its own"
+            ),
+        ),
+    ],
+)
+def test_a_refusal_of_a_budget_says_its_names_and_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+ON_THREE = (
+    ErrorSource("bias", "constant", Spread("gaussian", 0.7, 0.4), np.array([1.1, -0.6, 0.9])),
+    ErrorSource("mount", "per-observation", Spread("uniform", 0.3, 0.5), np.array([0.4, 1.3, -0.8])),
+    ErrorSource("noise", "random", Spread("fixed", 0.9), np.array([0.7, 0.5, 1.2]), apart=True),
+    ErrorSource("wheel", "periodic", Spread("uniform", 1.2, 0.3), np.array([-0.5, 1.0, 0.6]), freq_hz=0.7),
+    ErrorSource("heat", "drift", Spread("gaussian", 0.0, 0.02), np.array([1.5, 0.7, -1.1]), period_s=40.0),
+    ErrorSource("step", "transient", Spread("fixed", -2.0), np.array([0.8, -1.4, 0.5]), period_s=60.0, decay_s=4.0),
+)
+
+
+def come_to(*axes, kind="APE", window_s=None, spacing_s=None, **more):
+    """Mean, deviation, sum by the rules and quantile of all of them."""
+    (found,) = budget(ON_THREE, [Requirement(ErrorIndex(kind, window_s, spacing_s), axes=axes, **more)])
+    return [*found.mean_rad, *found.sigma_rad, found.by_rules_rad, found.quantile_rad]
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: come_to(0), [4.10332978, 1.35355348, 8.16395909, 7.44546399]),
+    (lambda: come_to(2, interpretation="ensemble", confidence=0.95),
+     [5.45235247, 0.666622543, 6.75890865, 6.65424658]),
+    (lambda: come_to(1, interpretation="mixed", confidence=0.9),
+     [0.156672887, 1.21118128, 2.14888881, 1.95327418]),
+    (lambda: come_to(2, 1, confidence=0.95),
+     [2.32333111, 0.926672887, 1.4768512, 1.33760735, 6.40665738, 5.38605614]),
+    (lambda: come_to(1, kind="MPE", window_s=3.0), [0.878238859, 0.566351076, 2.57727905, 3.02490367]),
+    (lambda: come_to(2, kind="MPE", window_s=3.0, interpretation="mixed"),
+     [0.340628979, 0.668774294, 2.34693647, 2.43059298]),
+    (lambda: come_to(0, kind="RPE", window_s=2.5, interpretation="ensemble"),
+     [2.98989418, 0.100323595, 3.29086266, 3.19912315]),
+    (lambda: come_to(1, kind="RPE", window_s=2.5), [0.000130100149, 1.14658658, 3.43986346, 2.58115881]),
+    (lambda: come_to(2, kind="PDE", window_s=1.5, spacing_s=9.0, observation_s=30.0),
+     [0.654284053, 0.145727487, 1.09146316, 1.33604563]),
+    (lambda: come_to(1, kind="PRE", window_s=1.5, spacing_s=47.0, observation_s=30.0,
+            interpretation="mixed"),
+     [0.00293206852, 0.833789906, 2.5042826, 2.91626574]),
+    (lambda: come_to(0, kind="PRE", window_s=1.5, spacing_s=47.0, observation_s=30.0,
+            interpretation="ensemble"),
+     [2.27465604, 0.604481499, 4.08808663, 4.46978679]),
+    (lambda: [x for each in shares(budget(ON_THREE, [Requirement(ErrorIndex("APE"), axes=(2,),
+            confidence=0.95, limit_rad=9.0)])[0]) for x in (each.without_rad, each.growth,
+            each.allowed, *each.mean_rad, *each.sigma_rad)],
+     [
+        3.08656149, 0.414085425, 2.93000612, 1.32, 0.762102355, 3.11378286, 0.359814127, 3.48398338, 1.71, 0.0,
+        4.01602378, 0.273201696, 3.58740531, 0.0, 1.08, 4.51184443, 0.0960738282, 6.69838259, 0.0, 0.636396103,
+        4.80490427, -0.00851036174, 23.9085438, -0.0666688883, 0.169969018, 5.3923795, -0.134667236, 14.8915406,
+        -0.64, 0.0,
+    ]),
+    (lambda: [x for each in shares(budget(ON_THREE[:2], [Requirement(ErrorIndex("APE"), axes=(0, 2),
+            confidence=0.95, limit_rad=9.0)])[0]) for x in (each.without_rad, each.growth,
+            each.allowed)],
+     [0.715541753, 0.987573709, 3.38115684, 2.70040738, 0.0124262908, 12.8583092]),
+    (lambda: [*(found := budget([ON_THREE[0], replace(ON_THREE[0], name="b", size=Spread("gaussian", 0.2,
+            0.9)), ON_THREE[2]], [Requirement(ErrorIndex("APE"), axes=(0,))], [Correlation("bias", "b",
+            -0.4)])[0]).mean_rad, *found.sigma_rad, found.quantile_rad],
+     [3.71524861, 0.63, 5.4680034]),
+    (lambda: beyond(budget(ON_THREE, [Requirement(ErrorIndex("APE"), axes=(1,))])[0], np.array([0.5, 2.0,
+            6.0])),
+     [0.762984964, 0.232716272, 7.93689069e-05]),
+])  # fmt: skip
+def test_budgets_of_sources_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
