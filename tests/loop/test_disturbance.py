@@ -36,8 +36,10 @@ from microrad.loop.disturbance import (
     psd,
     read_table,
     tables,
+    terms,
     wheels,
 )
+from microrad.loop.disturbance.terms import Term
 
 URAD = 1e-6
 STEP_S = 5e-3
@@ -665,3 +667,389 @@ def test_a_spectrum_of_nothing_is_refused():
     f = np.geomspace(1.0, 400.0, 40)
     with pytest.raises(ValueError, match="give three rows or more of a spectrum, in these units"):
         fit_table(f, 1e-200 / (1 + f**2), convention="radial")
+
+
+UNIT_ROWS = np.array([0.5, 1.5, 4.0, 9.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: SpectralLine(-2.5e-6, 30.0),
+            ValueError,
+            "amplitude of a spectral line is -2.5e-06 rad; give a finite number, zero or above",
+        ),
+        (
+            lambda: SpectralLine(2.5e-6, -30.0),
+            ValueError,
+            "frequency of a spectral line is -30 Hz; give a finite number above zero",
+        ),
+        (
+            lambda: replace(resonance(), C=np.ones((1, 3))),
+            ValueError,
+            (
+                'shaping filter of "resonance": A (2, 2), B (2, 1) and C (1, 3) do not fit together; give '
+                "A (n, n), B (n, inputs) and C (1, n)"
+            ),
+        ),
+        (
+            lambda: replace(resonance(), B=np.array([[nan], [0.0]])),
+            ValueError,
+            ('shaping filter of "resonance": A, B or C holds a number that is not finite; give finite numbers'),
+        ),
+        (
+            lambda: replace(resonance(), A=np.array([[0.25, 0.0], [0.0, -1.0]])),
+            ValueError,
+            (
+                'shaping filter of "resonance": a pole has the real part 0.25 rad/s, so its motion has no '
+                "variance; every pole must lie left of the imaginary axis"
+            ),
+        ),
+        (
+            lambda: first_order(1e-12, -2.5, convention="per-axis", name="hum"),
+            ValueError,
+            'corner frequency of "hum" is -2.5 Hz; give a finite number above zero',
+        ),
+        (
+            lambda: first_order(-1e-12, 2.5, convention="per-axis", name="hum"),
+            ValueError,
+            'level of "hum" is -1e-12 rad^2/Hz; give a finite number, zero or above',
+        ),
+        (
+            lambda: first_order(1e-12, 2.5, convention="both", name="hum"),
+            ValueError,
+            'convention "both" of a spectrum is not known; say "radial" or "per-axis"',
+        ),
+        (
+            lambda: body_pointing(-3e-6, 3.0, 0.5),
+            ValueError,
+            "body pointing error is -3e-06 rad; give a finite number, zero or above",
+        ),
+        (
+            lambda: body_pointing(3e-6, 0.0, 0.5),
+            ValueError,
+            ("number of sigmas of the body pointing error is 0 standard deviations; give a finite number above zero"),
+        ),
+        (
+            lambda: body_pointing(3e-6, 3.0, -0.5),
+            ValueError,
+            "bandwidth of the body pointing error is -0.5 Hz; give a finite number above zero",
+        ),
+        (
+            lambda: wheels(25.0, (1.0, 2.5, 4.0), (1e-9, 4e-10), convention="per-axis"),
+            ValueError,
+            "wheel: 3 harmonics and 2 coefficients; give one of each per line",
+        ),
+        (
+            lambda: wheels(25.0, (1.0, -2.5), (1e-9, 4e-10), convention="per-axis"),
+            ValueError,
+            "harmonic of the wheel is -2.5 times the speed; give a finite number above zero",
+        ),
+        (
+            lambda: wheels(25.0, (1.0, 2.5), (1e-9, -4e-10), convention="per-axis"),
+            ValueError,
+            ("coefficient of the wheel's harmonic 2.5 is -4e-10 rad/Hz^2; give a finite number, zero or above"),
+        ),
+        (
+            lambda: wheels(-25.0, (1.0, 2.5), (1e-9, 4e-10), convention="per-axis"),
+            ValueError,
+            "speed of the wheel is -25 Hz; give a finite number above zero",
+        ),
+        (lambda: [*combine()], ValueError, "no disturbance to combine; give one or more"),
+        (
+            lambda: band_rms(olympus(), np.array([3.0, 2.0, 5.0])),
+            ValueError,
+            "edges of the bands are [3.0, 2.0, 5.0] Hz; give two or more that rise from 0 Hz or above",
+        ),
+        (
+            lambda: Reference(1e-6, nan, 0.5),
+            ValueError,
+            "line_of_sight_rate_rad_s of a pointing reference is nan; give a finite number",
+        ),
+        (
+            lambda: Reference(1e-6, 2e-6, -0.5),
+            ValueError,
+            ("bandwidth of the body's loop in a pointing reference is -0.5 Hz; give a finite number above zero"),
+        ),
+        (
+            lambda: Reference(1e-6, 2e-6, 0.5, 1e-6, -3.0),
+            ValueError,
+            ("frequency of the sine in a pointing reference is -3 Hz; give a finite number, zero or above"),
+        ),
+        (
+            lambda: Misalignment(2.5e-6, inf),
+            ValueError,
+            "a misalignment of 2.5e-06 rad and inf rad/s; give finite numbers",
+        ),
+        (
+            lambda: discretise(replace(olympus(), lines=(SpectralLine(1e-6, 130.0),)), 4e-3),
+            ValueError,
+            (
+                '"OLYMPUS": a line at 130 Hz cannot be sampled every 0.004 s, which ends at 125 Hz; '
+                "shorten the step or leave the line out"
+            ),
+        ),
+        (
+            lambda: discretise(olympus(), -4e-3),
+            ValueError,
+            "step of a sampled disturbance is -0.004 s; give a finite number above zero",
+        ),
+        (
+            lambda: initial_state(
+                discretise(replace(olympus(), lines=(SpectralLine(1e-6, 13.0),)), 4e-3),
+                np.zeros((2, 5)),
+                np.zeros((1, 5)),
+            ),
+            ValueError,
+            "a start of 3 states with 1 lines needs 3 rows of normal numbers and 1 phases, not 2 and 1",
+        ),
+        (
+            lambda: fit_bands([0.0, 1.0, 10.0], [1e-6], convention="per-axis", name="steps"),
+            ValueError,
+            '"steps": 3 edges and 1 rms values; give finite edges, one more than rms values',
+        ),
+        (
+            lambda: fit_bands([0.0, 1.0, 10.0], [1e-6, -2e-6], convention="per-axis", name="steps"),
+            ValueError,
+            '"steps": rms between 1 and 10 Hz is -2e-06 rad; give a finite number above zero',
+        ),
+        (
+            lambda: fit_table(UNIT_ROWS, [1e-12, 2e-12, -3e-12, 1e-12], convention="per-axis", name="rows"),
+            ValueError,
+            '"rows", row 3: (4 Hz, -3e-12 rad^2/Hz) has a negative density; give rad^2/Hz, not decibels',
+        ),
+        (
+            lambda: fit_table(UNIT_ROWS, [1e-12, 2e-12, 0.0, 1e-12], convention="per-axis", name="rows"),
+            ValueError,
+            (
+                '"rows": the density at 4 Hz is zero, which no filter has; give the noise floor of the '
+                "measurement there, or end the table before"
+            ),
+        ),
+        (
+            lambda: fit_table(
+                UNIT_ROWS[[0, 2, 1, 3]], [1e-12, 2e-12, 3e-12, 1e-12], convention="per-axis", name="rows"
+            ),
+            ValueError,
+            (
+                '"rows", row 3: (1.5 Hz, 3e-12 rad^2/Hz) does not rise in frequency above the row before; '
+                "sort the rows and remove doubles"
+            ),
+        ),
+        (
+            lambda: fit_table(UNIT_ROWS, [1e-12, 2e-12, 3e-12], convention="per-axis", name="rows"),
+            ValueError,
+            '"rows": 4 frequencies and 3 densities; give as many of both, three or more',
+        ),
+        (
+            lambda: fit_table(UNIT_ROWS, [1e-12, nan, 3e-12, 1e-12], convention="per-axis", name="rows"),
+            ValueError,
+            '"rows", row 2: (1.5 Hz, nan rad^2/Hz) holds a number that is not finite; remove the row',
+        ),
+        (
+            lambda: fit_table(UNIT_ROWS, [1e-75, 2e-75, 3e-75, 1e-75], convention="per-axis", name="rows"),
+            ValueError,
+            (
+                '"rows": 4 rows from 0.5 Hz, with a density of 1e-75 rad^2/Hz; give three rows or more of '
+                "a spectrum, in these units"
+            ),
+        ),
+    ],
+)
+def test_a_refusal_of_a_disturbance_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+SHAKEN = combine(
+    first_order(3e-12, 2.3, convention="radial", name="hum"),
+    body_pointing(17e-6, 2.5, 0.4),
+    resonance(11.0, 0.07, 1.9e-6),
+    wheels(21.0, (1.0, 2.3), (2e-9, 7e-10), convention="radial"),
+)
+KINDS = (Term("first-order", 3e-12, 2.0), Term("low-pass", 5e-12, 7.0, 0.3), Term("band-pass", 2e-12, 19.0, 0.1))
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: psd(SHAKEN, np.array([0.1, 0.9, 10.7, 60.0])) * 1e12,
+     [105.198023, 5.23886669, 1.43070536, 0.00223649534]),
+    (lambda: band_rms(SHAKEN, np.array([0.0, 0.5, 3.0, 21.5, 60.0, inf])) * 1e6,
+     [6.39408558, 2.92878906, 2.36924618, 0.528404533, 0.364523835]),
+    (lambda: [SHAKEN.rms_rad * 1e6, *(x for line in SHAKEN.lines for x in (line.amplitude_rad * 1e6,
+            line.freq_hz))],
+     [7.44899673, 0.623668181, 21.0, 0.218283863, 48.3]),
+    (lambda: [band_rms(one_input(SHAKEN), np.array([0.5, 30.0]))[0] * 1e6, one_input(SHAKEN).B.shape[1],
+            one_input(SHAKEN).A.shape[0]],
+     [3.7827386, 1, 5]),
+    (lambda: [float(x) for x in Reference(1.5e-6, -2.5e-6, 0.4, 0.7e-6, 1.3).at(np.array([0.0, 0.2,
+            1.9])) * 1e6],
+     [1.5, 1.80562792, 0.64484019]),
+    (lambda: [float(x) for x in Misalignment(1.5e-6, -0.25e-6).at(np.array([0.0, 2.0, 7.5])) * 1e6],
+     [1.5, 1.0, -0.375]),
+    (lambda: [float(x) for x in disturbance.SampledReference(np.array([1.0, 4.0, 9.0, 16.0]),
+            0.25).at(np.array([0.0, 0.13, 0.49, 0.62, 5.0]))],
+     [1.0, 4.0, 9.0, 9.0, 16.0]),
+    (lambda: [float(x) for term in KINDS for x in terms.term_density(term, np.array([0.5, 6.0,
+            20.0])) * 1e12],
+     [
+        0.898757326, 0.0954929659, 0.00945474909, 0.275132008, 0.814737757, 0.00502914811, 9.29413545e-06,
+        0.00164095749, 0.265221887,
+    ]),
+    (lambda: [x for term in KINDS for x in psd(Disturbance("one", *terms.term_filter(term), (), "", ""),
+            np.array([0.5, 6.0, 20.0])) * 1e12],
+     [
+        0.898757326, 0.0954929659, 0.00945474909, 0.275132008, 0.814737757, 0.00502914811, 9.29413545e-06,
+        0.00164095749, 0.265221887,
+    ]),
+    (lambda: [float(x) for x in discretise(replace(SHAKEN, lines=SHAKEN.lines[::-1]),
+            STEP_S).line_amplitude_rad * 1e6],
+     [0.218283863, 0.623668181]),
+    (lambda: [float(x) for x in np.linalg.norm(discretise(resonance(11.0, 0.07), STEP_S).Ad, axis=0)],
+     [0.976099976, 0.976099976]),
+    (lambda: fits._power_law_integrals(np.array([1.0, 3.0, 4.0, 9.0]), np.array([5.0, 2.0, 2.0, 1.0])),
+     [6.0256851, 2.0, 6.88494919]),
+])  # fmt: skip
+def test_disturbances_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: SHAKEN.basis.split("; "),
+            [
+                "S(f) = 3e-12 / (1 + (f / 2.3 Hz)^2) rad^2/Hz, one-sided, radial",
+                "17 µrad at 2.5 sigma, per-axis",
+                "second-order low pass of damping 0.707 at 0.4 Hz",
+                "test",
+                "amplitudes C_i speed^2 of 2 harmonics at 21 turns a second, radial",
+            ],
+        ),
+        (
+            lambda: [SHAKEN.name, SHAKEN.source],
+            ["hum + body pointing + resonance + reaction wheel", "given; attitude control; test"],
+        ),
+        (
+            lambda: [
+                first_order(3e-12, 2.3, convention="radial").name,
+                olympus(convention="per-axis").basis,
+                olympus().source,
+            ],
+            [
+                "first order",
+                "S(f) = 1.6e-10 / (1 + (f / 1 Hz)^2) rad^2/Hz, one-sided, per-axis",
+                "ESA OLYMPUS base motion spectrum",
+            ],
+        ),
+    ],
+)
+def test_what_a_disturbance_is_made_of_is_said_in_numbers(found, expected):
+    assert found() == expected
+
+
+def typed(*lines, unit=None):
+    return read_table("measured.csv", unit, "\n".join(lines).encode())
+
+
+WITH_UNIT = "Hz, urad^2/Hz"
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: read_table("no such table.csv"),
+            ValueError,
+            "no such table.csv: there is no such file; check the path of the table",
+        ),
+        (
+            lambda: typed("f, S", "1, 2", "2, 3", "3, 1"),
+            ValueError,
+            (
+                'measured.csv: no unit of the density is named; write one heading line such as "Hz, '
+                'urad^2/Hz", or give the unit'
+            ),
+        ),
+        (
+            lambda: typed(WITH_UNIT, "also nrad^2/Hz", "1, 2", "2, 3", "3, 1"),
+            ValueError,
+            (
+                "measured.csv: the units nrad^2/Hz and urad^2/Hz are named; write one heading line such as "
+                '"Hz, urad^2/Hz", or give the unit'
+            ),
+        ),
+        (
+            lambda: typed("f in kHz, urad^2/Hz", "1, 2", "2, 3", "3, 1"),
+            ValueError,
+            'measured.csv: the heading says "kHz"; give frequencies in Hz',
+        ),
+        (
+            lambda: typed(WITH_UNIT, "1, 2", "2, 3", "3, 1", unit="deg^2/Hz"),
+            ValueError,
+            ('measured.csv: "deg^2/Hz" is no unit of a density; say one of rad^2/Hz, mrad^2/Hz, urad^2/Hz, nrad^2/Hz'),
+        ),
+        (
+            lambda: typed(WITH_UNIT, "", "1, 2", "# a remark", "2, 3, 4", "3, 1"),
+            ValueError,
+            ("measured.csv, line 5: 3 columns; give two, frequency (Hz) and density, with a decimal point"),
+        ),
+        (
+            lambda: typed(WITH_UNIT, "1; 2", "2; 3,5", "3; 1"),
+            ValueError,
+            'measured.csv, line 3: "2; 3,5" is not two numbers; decimals take a point',
+        ),
+        (
+            lambda: typed(WITH_UNIT, "1; 2", "2; 3", "", "2; 1"),
+            ValueError,
+            (
+                "measured.csv, line 5: (2 Hz, 1e-12 rad^2/Hz) does not rise in frequency above the row "
+                "before; sort the rows and remove doubles"
+            ),
+        ),
+        (
+            lambda: typed(WITH_UNIT, "1, 2", "2, -3", "3, 1"),
+            ValueError,
+            ("measured.csv, line 3: (2 Hz, -3e-12 rad^2/Hz) has a negative density; give rad^2/Hz, not decibels"),
+        ),
+        (
+            lambda: typed(WITH_UNIT, "-1, 2", "2, 3", "3, 1"),
+            ValueError,
+            (
+                "measured.csv, line 2: (-1 Hz, 2e-12 rad^2/Hz) has a negative frequency; give a one-sided "
+                "spectrum, from 0 Hz up"
+            ),
+        ),
+        (
+            lambda: typed(WITH_UNIT, "1, 2", "2, 3"),
+            ValueError,
+            "measured.csv: 2 frequencies and 2 densities; give as many of both, three or more",
+        ),
+        (
+            lambda: read_table("measured.csv", None, b"Hz, urad^2/Hz\n1, 2\xff"),
+            ValueError,
+            (
+                "measured.csv: the table cannot be read as text ('utf-8' codec can't decode byte 0xff in "
+                "position 18: invalid start byte); save it as CSV in UTF-8"
+            ),
+        ),
+    ],
+)
+def test_a_refusal_of_a_table_says_its_line_and_what_stands_there(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [*typed("1 2", "2 3.5", "4 1", unit="nrad^2/Hz")[1] * 1e18, *typed("Hz; mrad2 per Hz",
+            "1;2", "2;3", "4;1")[1] * 1e6],
+     [2.0, 3.5, 1.0, 2.0, 3.0, 1.0]),
+    (lambda: [x for each in typed("Hz\tµrad²/Hz", "#", "0.5\t2e3", "# a remark", "2\t7",
+            "4.5\t1") for x in each * [1.0, 1.0, 1.0]],
+     [0.5, 2.0, 4.5, 2e-09, 7e-12, 1e-12]),
+])  # fmt: skip
+def test_a_table_is_read_in_its_unit(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)

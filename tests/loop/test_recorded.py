@@ -431,3 +431,89 @@ def test_other_orders_rates_and_lengths_are_refused(small, monkeypatch):
     unstable = LOOP.assembled(Controller.pid(0.0, 1e8, rate_hz=2000.0))
     with pytest.raises(ValueError, match="is unstable: a pole at"):
         recorded_residual(LOOP.parts, unstable, small, 0.0)
+
+
+MOVING = np.sin(0.37 * np.arange(400.0)) + 0.01 * np.arange(400.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: recorded_motion(MOVING.reshape(2, 200), 1e-3, "tracker"),
+            ValueError,
+            '"tracker" has the shape (2, 200): give one row of 200 samples or more, in rad',
+        ),
+        (
+            lambda: recorded_motion(MOVING[:150], 1e-3, "tracker"),
+            ValueError,
+            '"tracker" has the shape (150,): give one row of 200 samples or more, in rad',
+        ),
+        (
+            lambda: recorded_motion(np.where(np.arange(400) % 151 == 150, np.nan, MOVING), 1e-3, "tracker"),
+            ValueError,
+            (
+                '"tracker": sample 150 is nan, 2 such samples in all; cut the recording to a part without '
+                "them: a gap that is filled in is no motion that was measured"
+            ),
+        ),
+        (
+            lambda: recorded_motion(np.where(np.arange(400) == 37, -np.inf, MOVING), 1e-3, "tracker"),
+            ValueError,
+            (
+                '"tracker": sample 37 is -inf, 1 such samples in all; cut the recording to a part without '
+                "them: a gap that is filled in is no motion that was measured"
+            ),
+        ),
+        (
+            lambda: recorded_motion(np.full(400, 0.375), 1e-3, "tracker"),
+            ValueError,
+            '"tracker" stands still at 0.375 rad; name a channel that moves',
+        ),
+        (
+            lambda: recorded_motion(MOVING, -1e-3, "tracker"),
+            ValueError,
+            'the step of "tracker" is -0.001 s; give a finite number above zero',
+        ),
+        (
+            lambda: resampled(recorded_motion(MOVING, 1e-3, "tracker"), 2e-8),
+            ValueError,
+            (
+                '"tracker": 400 samples, 0.001 s apart, are not played every 2e-08 s: rates may differ '
+                "10000 times, and 5e+07 steps are the most; cut the recording"
+            ),
+        ),
+        (
+            lambda: fit_recording(MOVING, 1e-3, order=25, name="tracker"),
+            ValueError,
+            '"tracker": a shaping filter of 25 states; give 1 to 24',
+        ),
+    ],
+)
+def test_a_refusal_of_a_recording_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+OWN = recorded_motion(MOVING, 2.5e-3, "tracker")
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [OWN.duration_s, OWN.half_rate_hz, OWN.mean_rad, OWN.slope_rad_s, *OWN.rest_rad[[0, 200,
+            -1]], *OWN.trend_rad(np.array([0.0, 0.4]))],
+     [
+        0.9975, 200.0, 2.008388, 4.00018735, -0.013294555, -0.998534491, 0.0113707226, 0.013294555, 1.6133695,
+    ]),
+    (lambda: [resampled(OWN, 1e-3).size, *resampled(OWN, 1e-3)[[300, 501, 702]], resampled(OWN,
+            7e-3).size, *resampled(OWN, 7e-3)[[40, 71]]],
+     [998, 1.60565921, 1.05493825, 2.58641407, 143, 0.555947236, 1.02460104]),
+    (lambda: [edge_s(OWN, 2.5e-3), edge_s(OWN, 1e-3), edge_s(OWN, 7e-3), recorded.beyond_rms(OWN, 30.0),
+            density(OWN.rest_rad, 2.5e-3, 4)[2], *density(OWN.rest_rad, 2.5e-3, 4)[1][[5, 6, 7]]],
+     [0.0, 0.127960762, 0.358290134, 0.264737888, 7, 0.0283884745, 0.082014822, 0.0145313989]),
+    (lambda: [x for line in find_lines(OWN.rest_rad, 2.5e-3)[0][:1] for x in (line.amplitude_rad,
+            line.freq_hz)],
+     [1.00000063, 23.5549312]),
+])  # fmt: skip
+def test_parts_of_a_recording_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)

@@ -319,3 +319,89 @@ def test_refusals():
         exposure(lti.StateSpace(-np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1))), 1.0)
     with pytest.raises(ValueError, match="an exposure is 0 s; give a finite number above zero"):
         exposure(lti.StateSpace(-np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1))), 0.0)
+
+
+MOVED = disturbance.combine(
+    RADIAL, resonance(17.0, 0.05), disturbance.wheels(13.0, (1.0, 2.5), (3e-9, 5e-10), convention="radial")
+)
+MADE = 1e-6 * np.sin(0.37 * np.arange(400)) + 3e-7 * np.cos(1.9 * np.arange(400)) + 1e-9 * np.arange(400)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [windowed_rms(MOVED, each) * 1e6 for each in (ErrorIndex("APE"), ErrorIndex("MPE", 0.3),
+            ErrorIndex("RPE", 0.3), ErrorIndex("PDE", 0.3, 1.7), ErrorIndex("PRE", 0.2, 2.9))],
+     [15.8868958, 12.1113102, 10.2815187, 17.1275277, 18.5634066]),
+    (lambda: [rational_rms(MOVED, each) * 1e6 for each in (ErrorIndex("APE"), ErrorIndex("MPE", 0.3),
+            ErrorIndex("RPE", 0.3))],
+     [15.8868958, 12.6219093, 10.2393427]),
+    (lambda: [float(x) for each in (ErrorIndex("MKE", 0.3), ErrorIndex("RKE", 0.3), ErrorIndex("PDE",
+            0.3, 1.7)) for x in each.weight([0.2, 1.1, 7.0])],
+     [
+        0.98821244, 0.689316052, 0.00219394832, 0.0117875598, 0.310683948, 0.997806052, 3.03544629, 0.434893487,
+        0.000838013689,
+    ]),
+    (lambda: [float(x) for each in (ErrorIndex("MPE", 0.3), ErrorIndex("RPE",
+            0.3)) for x in each.rational_weight([0.2, 1.1, 7.0])],
+     [0.992059208, 0.752997397, 0.0258235216, 0.0118418837, 0.32733388, 0.995575214]),
+    (lambda: [tabulated_rms([0.1, 0.7, 3.0, 40.0], [3e-12, 2e-12, 5e-13, 1e-15], each,
+            "one") * 1e6 for each in (ErrorIndex("APE"), ErrorIndex("MPE", 0.3), ErrorIndex("RPE",
+            0.3), ErrorIndex("PDE", 0.3, 1.7))],
+     [2.1312687, 1.52579516, 1.48803742, 2.24984953]),
+    (lambda: [tabulated_rms([0.1, 0.7, 3.0, 40.0], [3e-12, 2e-12, 5e-13, 1e-15], ErrorIndex("RPE", 0.3),
+            "two") * 1e6],
+     [2.10440271]),
+    (lambda: [recorded_rms(MADE, 2e-3, each) * 1e6 for each in (ErrorIndex("APE"), ErrorIndex("MPE",
+            0.02), ErrorIndex("RPE", 0.02), ErrorIndex("PDE", 0.02, 0.07))],
+     [0.775804878, 0.435241826, 0.638908592, 0.145337313]),
+    (lambda: [x for each in ErrorIndex("PRE", 0.3, 1.7).cosines for x in each],
+     [1.12579093, 0.0, -1.12579093, 0.3, -1.12579093, 1.7, 0.562895465, 1.4, 0.562895465, 2.0]),
+])  # fmt: skip
+def test_windows_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: ErrorIndex("XPE", 1.0),
+            ValueError,
+            'no error index "XPE"; give one of APE, MPE, RPE, PDE, PRE, AKE, MKE, RKE',
+        ),
+        (lambda: ErrorIndex("RPE"), ValueError, "RPE needs window_s: give the time in s"),
+        (lambda: ErrorIndex("APE", 0.5), ValueError, "APE has no window_s: leave it out"),
+        (lambda: ErrorIndex("RPE", 0.5, 2.0), ValueError, "RPE has no spacing_s: leave it out"),
+        (lambda: ErrorIndex("PDE", 0.5), ValueError, "PDE needs spacing_s: give the time in s"),
+        (lambda: ErrorIndex("RKE", -0.5), ValueError, "window_s of RKE is -0.5 s; give a finite number above zero"),
+        (lambda: ErrorIndex("PRE", 0.5, 0.0), ValueError, "spacing_s of PRE is 0 s; give a finite number above zero"),
+        (
+            lambda: ErrorIndex("PRE", 0.5, 2.5).rational_weight(1.0),
+            ValueError,
+            "PRE has no rational form: a difference of two means has a delay in it",
+        ),
+        (
+            lambda: recorded_rms(MADE, 2e-3, ErrorIndex("RPE", 4.0)),
+            ValueError,
+            ("RPE looks at 4 s, and the recording is 0.8 s long: give shorter times or a longer recording"),
+        ),
+        (
+            lambda: recorded_rms(MADE, -2e-3, ErrorIndex("APE")),
+            ValueError,
+            "the step of a recording is -0.002 s; give a finite number above zero",
+        ),
+        (
+            lambda: tabulated_rms([0.1, 0.7, 3.0], [3e-12, -2e-12, 5e-13], ErrorIndex("APE"), "one"),
+            ValueError,
+            "a density needs one finite value above 0 for each frequency above 0 Hz",
+        ),
+        (
+            lambda: tabulated_rms([0.1, 0.7, 3.0], [3e-12, 2e-12, 5e-13], ErrorIndex("APE"), "both"),
+            ValueError,
+            'sided is "both": say "one" or "two", they differ by a factor of 2 in power',
+        ),
+    ],
+)
+def test_a_refusal_of_a_window_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
