@@ -1,5 +1,6 @@
 """A loop by itself, without a mission: beside linear theory, the paper's loop, and one axis beside two."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ from numpy.testing import assert_allclose
 from microrad import mirror as mirrors
 from microrad.core import lti
 from microrad.loop import control, coupled_study, sine_run
-from microrad.loop.disturbance import fit_spectrum
+from microrad.loop.disturbance import first_order, fit_spectrum
 from microrad.loop.workbench import Controller, Loop, tune
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
@@ -259,3 +260,221 @@ def test_a_controller_of_several_axes_just_above_its_margin_is_bound_by_it(monke
     tuned = tune(two, "LQG", modulus_margin=LOOP.margins(SLOW).modulus / above)
     assert_allclose(tuned.margins.modulus, LOOP.margins(SLOW).modulus, rtol=1e-6)
     assert tuned.bound_by == bound_by
+
+
+COUPLED = lti.StateSpace(
+    np.diag([-2600.0, -3100.0]), np.array([[2600.0, 180.0], [150.0, 3100.0]]), np.diag([50e-6, 40e-6]), np.zeros((2, 2))
+)
+ON_TWO = Loop(mirror=Mirror.of_system(COUPLED, "pair"), rate_hz=10e3, vibration=VIBRATION)
+OF_TWO = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=2)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda: replace(LOOP, rate_hz=-10e3), ValueError, "rate_hz of a loop is -10000.0: give a number above 0"),
+        (lambda: replace(LOOP, slew_v_s=0.0), ValueError, "slew_v_s of a loop is 0.0: give a number above 0"),
+        (
+            lambda: replace(LOOP, amplifier_bandwidth_hz=math.nan),
+            ValueError,
+            "amplifier_bandwidth_hz of a loop is nan: give a number above 0",
+        ),
+        (
+            lambda: replace(LOOP, steps_per_sample=0),
+            ValueError,
+            "a loop has 0 plant steps a sample: give 1 or more, better 10",
+        ),
+        (
+            lambda: replace(LOOP, drive_range_v=(0.5, 2.5)),
+            ValueError,
+            "drive_range_v of a loop is (0.5, 2.5) V: rest, 0 V, has to lie inside",
+        ),
+        (
+            lambda: replace(LOOP, delay_s=33e-6),
+            ValueError,
+            (
+                "loop: its delay of 33 µs is no whole number of plant steps of 10 µs: it would end inside "
+                "a step; the nearest delay that would do is 30 µs, or choose a plant step that divides it"
+            ),
+        ),
+        (
+            lambda: replace(LOOP, sensor_delay_s=-20e-6),
+            ValueError,
+            (
+                "sensor of the loop: delay is -20 µs; give a finite number of at least 0 (it runs from the "
+                "middle of the exposure to the delivery)"
+            ),
+        ),
+        (
+            lambda: replace(LOOP, sensor_delay_s=0.25),
+            ValueError,
+            (
+                "sensor_delay_s of a loop is 0.25 s, more than 2000 plant steps of 1e-05 s, each of them a "
+                "state: give a shorter one, or fewer steps per sample"
+            ),
+        ),
+        (
+            lambda: replace(ON_TWO, optics=[[1.0, 0.5, 2.0]]),
+            ValueError,
+            (
+                "optics of a loop has shape (1, 3): give finite numbers of shape (axes, 2), a row for each "
+                "line-of-sight angle"
+            ),
+        ),
+        (
+            lambda: replace(ON_TWO, optics=[[1.0, math.inf], [0.0, 1.0]]),
+            ValueError,
+            (
+                "optics of a loop has shape (2, 2): give finite numbers of shape (axes, 2), a row for each "
+                "line-of-sight angle"
+            ),
+        ),
+        (
+            lambda: replace(ON_TWO, optics=[[1.0, 0.5]], gauge_noise_rad=1e-9),
+            ValueError,
+            "a loop with a gauge needs one line-of-sight angle for each output of the mirror",
+        ),
+        (
+            lambda: Controller.pid(math.inf, 5e6, 0.25, rate_hz=10e3),
+            ValueError,
+            "gains (inf, 5000000.0, 0.25) and a filter of 0.0 s make no PID: give finite ones",
+        ),
+        (
+            lambda: Controller.pid(1.0, 5e6, 0.25, rate_hz=10e3, derivative_filter_s=-1e-3),
+            ValueError,
+            "gains (1.0, 5000000.0, 0.25) and a filter of -0.001 s make no PID: give finite ones",
+        ),
+        (
+            lambda: Controller.pid(1.0, 5e6, rate_hz=0.0, axes=2),
+            ValueError,
+            "a PID of 2 axes at 0.0 Hz: give one axis or more and a rate above 0 Hz",
+        ),
+        (
+            lambda: LOOP.margins(Controller.pid(0.0, 5e6, rate_hz=8e3)),
+            ValueError,
+            "controller 'PID' is made for 8000 Hz, and this loop has 10000 Hz: make one for this rate",
+        ),
+        (
+            lambda: ON_TWO.residual_rms_rad(SLOW),
+            ValueError,
+            (
+                "controller 'PID' has 1 inputs, 1 outputs and an anti-windup of shape (1, 1): a loop of 2 "
+                "axes takes an error and gives a command for each, and an anti-windup of shape (1, 2)"
+            ),
+        ),
+        (
+            lambda: LOOP.residual_rms_rad(OF_TWO),
+            ValueError,
+            (
+                "controller 'PID' has 2 inputs, 2 outputs and an anti-windup of shape (2, 2): a loop of 1 "
+                "axes takes an error and gives a command for each, and an anti-windup of shape (2, 1)"
+            ),
+        ),
+        (
+            lambda: LOOP.residual_rms_rad(replace(SLOW, anti_windup=SLOW.anti_windup * math.nan)),
+            ValueError,
+            (
+                "controller 'PID': anti-windup holds a number that is not finite; look for a gain that is "
+                "nan or infinite"
+            ),
+        ),
+        (
+            lambda: LOOP.residual_rms_rad(replace(SLOW, anti_windup=np.ones((3, 2)))),
+            ValueError,
+            (
+                "controller 'PID' has 1 inputs, 1 outputs and an anti-windup of shape (3, 2): a loop of 1 "
+                "axes takes an error and gives a command for each, and an anti-windup of shape (1, 1)"
+            ),
+        ),
+        (
+            lambda: LOOP.simulate(SLOW, 0.1, reference_rad=np.zeros((5, 2))),
+            ValueError,
+            "reference_rad has shape (5, 2): give finite samples of shape (samples, 1)",
+        ),
+        (
+            lambda: ON_TWO.simulate(OF_TWO, 0.1, reference_rad=[[0.0, math.nan]]),
+            ValueError,
+            "reference_rad has shape (1, 2): give finite samples of shape (samples, 2)",
+        ),
+        (
+            lambda: tune(LOOP, "H-infinity"),
+            ValueError,
+            (
+                "'H-infinity' cannot be tuned for a loop of one axis: choose one of PI, PI + notch, "
+                "resonant damping, disturbance observer, LQG"
+            ),
+        ),
+        (
+            lambda: tune(ON_TWO, "PI + notch"),
+            ValueError,
+            "'PI + notch' cannot be tuned for a loop of 2 axes: choose one of LQG, H-infinity",
+        ),
+        (
+            lambda: tune(LOOP, "PI", modulus_margin=1.25),
+            ValueError,
+            "modulus_margin is 1.25: give a number above 0 and below 1, such as 0.5",
+        ),
+        (
+            lambda: tune(replace(ON_TWO, vibration=()), "LQG"),
+            ValueError,
+            "the loop has no vibration, so that no controller is best: give it one, see fit_spectrum",
+        ),
+    ],
+)
+def test_a_refusal_of_a_loop_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+HUM = first_order(9e-12, 3.0, convention="radial", name="hum")
+ROLL = first_order(2e-12, 11.0, convention="per-axis", name="roll")
+UNLIKE = {
+    "rate_hz": 8e3,
+    "vibration": (HUM, ROLL),
+    "sensor_noise_rad": 0.3e-6,
+    "delay_s": 25e-6,
+    "sensor_delay_s": 62.5e-6,
+    "amplifier_bandwidth_hz": 3e3,
+}
+SKEW = Loop(mirror=Mirror.of_system(COUPLED, "pair"), optics=[[1.3, 0.2], [-0.1, 0.8]], **UNLIKE)
+ALONE = Loop(mirror=STRAIGHT, optics=[[1.3]], **UNLIKE)
+GAINS = {"rate_hz": 8e3, "derivative_filter_s": 2e-4}
+BOTH, SINGLE = (Controller.pid(0.3e3, 4e6, 0.05, axes=axes, **GAINS) for axes in (2, 1))
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: SKEW.residual_rms_rad(BOTH) * 1e6, [3.98212655, 3.96351713]),
+    (lambda: [SKEW.margins(BOTH).modulus, ALONE.margins(SINGLE).modulus,
+            ALONE.residual_rms_rad(SINGLE)[0] * 1e6],
+     [0.956161364, 0.474011861, 2.99408245]),
+    (lambda: [*SINGLE.system.A.ravel(), *SINGLE.system.B.ravel(), *SINGLE.system.C.ravel(),
+            *SINGLE.system.D.ravel(), *SINGLE.anti_windup.ravel()],
+     [
+        1.0, 0.0, 0.0, 0.615384615, 500.0, 0.384615385, 1.0, -153.846154, 953.846154, 0.524193548,
+        0.000403225806,
+    ]),
+    (lambda: [SKEW.parts.timing.delay_steps, SKEW.parts.optical.delay_steps,
+            SKEW.parts.timing.steps_per_sample, SKEW.parts.timing.period_s, SKEW.axes],
+     [2, 5, 10, 0.000125, 2]),
+])  # fmt: skip
+def test_loops_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [repr(SKEW), repr(ALONE), repr(BOTH), repr(SINGLE)],
+            [
+                "<Loop of 2 axes at 8000 Hz around mirror 'pair'>",
+                "<Loop of 1 axes at 8000 Hz around mirror 'straight'>",
+                "<Controller 'PID': 2 inputs, 2 outputs, 4 states>",
+                "<Controller 'PID': 1 inputs, 1 outputs, 2 states>",
+            ],
+        ),
+    ],
+)
+def test_loops_and_controllers_are_shown_with_their_names(found, expected):
+    assert found() == expected
