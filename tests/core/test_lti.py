@@ -383,3 +383,89 @@ def test_principal_axes_point_to_where_their_largest_entry_is_above_0(covariance
     found, directions = lti.principal_axes(np.array(covariance))
     assert_allclose(found, variances, rtol=1e-9, atol=1e-15)
     assert_allclose(directions, axes, rtol=1e-6, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: lti.modal_from_polynomials((1.0, 2.0, 3.0), (0.0, 4.0, 5.0, 6.0)),
+            ValueError,
+            "numerator of order 2 over denominator of order 2: not strictly proper",
+        ),
+        (
+            lambda: lti.modal_from_polynomials((1.0,), (2.5e-151, 1.0, 3.0)),
+            ValueError,
+            "the highest power of s has a coefficient of 2.5e-151, which is nothing beside the others",
+        ),
+        (
+            lambda: lti.modal_from_polynomials((1.0,), (1.0, 6.0, 9.0)),
+            ValueError,
+            "two poles coincide: the transfer function has no modal form",
+        ),
+        (
+            lambda: lti.modal_from_polynomials(
+                (1.0,), tuple(np.poly([-7.0, -7.0 * (1.0 + 2e-5), -7.0 * (1.0 - 2e-5), -9.0]))
+            ),
+            ValueError,
+            "poles nearly coincide: the transfer function has no accurate modal form",
+        ),
+        (
+            lambda: lti.modal_from_roots(
+                np.array([-1.0, -3.0], dtype=complex), np.array([-2.0, -4.0], dtype=complex), 1.5
+            ),
+            ValueError,
+            "2 zeros over 2 poles: not strictly proper",
+        ),
+        (
+            lambda: lti.modal_from_roots(
+                np.array([3j * pi, -3j * pi]), np.array([-1.0, -2.0, -5.0], dtype=complex), 1.5
+            ),
+            ValueError,
+            "the transfer function vanishes at 1.5 Hz and cannot be divided by its gain there",
+        ),
+    ],
+)
+def test_a_refusal_of_a_transfer_function_says_its_orders(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+BIQUAD = lti.modal_from_polynomials((3.0, 70.0), (2.0, 31.0, 470.0, 900.0))
+FROM_ROOTS = lti.modal_from_roots(np.array([-4.0 + 7.0j, -4.0 - 7.0j]), np.array([-2.0, -9.0 + 3.0j, -9.0 - 3.0j]), 0.8)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [x for each in lti.frequency_response(BIQUAD, np.array([0.0, 0.3, 2.5]))[:, 0,
+            0] for x in (each.real, each.imag)],
+     [0.0777777778, 0.0, 0.0434770946, -0.0408687491, -0.0107215585, -0.00639648208]),
+    (lambda: [x for each in lti.frequency_response(FROM_ROOTS, np.array([0.1, 0.8, 2.5]))[:, 0,
+            0] for x in (each.real, each.imag)],
+     [3.4198798, -1.25728111, 0.218524496, -0.975831463, 0.25424272, -0.38277815]),
+    (lambda: [x for each in lti.zero_order_hold(BIQUAD.A, BIQUAD.B,
+            0.03) for x in np.linalg.svd(each)[1]],
+     [0.936537703, 0.818962281, 0.818962281, 0.039671202]),
+    (lambda: [*lti.modal_matrix([(-2.0, 0.0), (-1.0, 5.0), (-3.0, 0.0)]).ravel()],
+     [-2.0, 0.0, 0.0, 0.0, 0.0, -1.0, -5.0, 0.0, 0.0, 5.0, -1.0, 0.0, 0.0, 0.0, 0.0, -3.0]),
+    (lambda: [*lti.principal_axes(np.array([[4.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0, 2.25]]))[0],
+            *lti.principal_axes(np.array([[4.0, 0.0, 0.0], [0.0, 1.5, 0.0], [0.0, 0.0,
+            2.25]]))[1].ravel()],
+     [1.5, 2.25, 4.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+    (lambda: [x for each in lti.principal_axes(np.array([[4.0, 1.1], [1.1,
+            2.25]])) for x in each.ravel()],
+     [1.71943072, 4.53056928, -0.434440119, 0.900700718, 0.900700718, 0.434440119]),
+    (lambda: [*lti.covariance_root(np.array([[4.0, 1.1, -0.4], [1.1, 2.25, 0.7], [-0.4, 0.7,
+            3.0]])).ravel()],
+     [2.0, 0.0, 0.0, 0.55, 1.39552857, 0.0, -0.2, 0.580425235, 1.61960074]),
+    (lambda: [float(x) for x in lti.to_bits(np.array([0.7123456789, -3.3e-7]),
+            12)] + [float(x) for x in lti.decay_to_bits(np.array([0.99871234]), 12)],
+     [0.712402344, -3.30037437e-07, 0.99871254]),
+    (lambda: [*lti.sliding_cases(2).ravel(), *lti.sliding_cases(7).ravel()],
+     [
+        0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0,
+        1.0,
+    ]),
+])  # fmt: skip
+def test_systems_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)

@@ -500,3 +500,20 @@ def test_half_a_unit_of_the_last_digit_is_what_the_text_leaves_open(text, wavele
     sources = {} if text is None else {"communication.wavelength": SimpleNamespace(value=text)}
     study = SimpleNamespace(file=SimpleNamespace(sources=sources))
     assert judge._half_digit_m(study, wavelength_m) == pytest.approx(half_m, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda: compliance.standard("sdaa"), ValueError, 'there is no standard "sdaa"; did you mean sda?'),
+        (
+            lambda: compliance.standard("x" * 80),
+            ValueError,
+            ('there is no standard "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"; there is sda'),
+        ),
+    ],
+)
+def test_a_name_that_no_standard_has_is_answered_with_the_nearest(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words

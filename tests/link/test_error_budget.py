@@ -617,8 +617,8 @@ def test_correlated_noises_stand_with_common_deviations_at_their_worst_time():
         (UNLIKE_PAIR, [Correlation("a", "b", 0.5)], "only two Gaussian errors of one class"),
         (
             [*two(), replace(source("random", 1.0), name="c")],
-            [Correlation("a", "b", 0.9), Correlation("b", "c", 0.9), Correlation("a", "c", -0.9)],
-            "their matrix has the eigenvalue -0.8, so that no errors can be correlated so",
+            [Correlation("a", "b", 0.87), Correlation("b", "c", 0.93), Correlation("a", "c", -0.71)],
+            "their matrix has the eigenvalue -0.677, so that no errors can be correlated so",
         ),
     ],
 )
@@ -1059,11 +1059,11 @@ PAIR = two()
             lambda: budget(
                 [*PAIR, replace(PAIR[0], name="c")],
                 [asked()],
-                [Correlation("a", "b", 0.9), Correlation("b", "c", 0.9), Correlation("a", "c", -0.9)],
+                [Correlation("a", "b", 0.87), Correlation("b", "c", 0.93), Correlation("a", "c", -0.71)],
             ),
             ValueError,
             (
-                "correlations of a, b, c: their matrix has the eigenvalue -0.8, so that no errors can be "
+                "correlations of a, b, c: their matrix has the eigenvalue -0.677, so that no errors can be "
                 "correlated so; give a positive semidefinite one"
             ),
         ),

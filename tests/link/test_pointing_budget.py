@@ -431,3 +431,184 @@ def test_totals_that_leave_nothing_to_allocate_are_refused():
             summation.allocate(LINES, total, rule="rss", confidence=0.997)
     with pytest.raises(ValueError, match='no rule "rayleigh" to allocate by; give one of rss, esa-1993'):
         summation.allocate(LINES, 1e-4, rule="rayleigh", confidence=0.997)
+
+
+MIXED = [
+    stated("bias", "bound", "per-axis", 41.0 * URAD, "mount"),
+    stated("random", "2-sigma", "radial", 73.0 * URAD, "body"),
+    stated("drift", "3-sigma", "x", 55.0 * URAD, "heat"),
+    stated("transient", "1-sigma", "per-axis", 17.0 * URAD, "slew"),
+]
+TERMS = {each: [error_term(one, each) for one in MIXED] for each in ("temporal", "mixed")}
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [x * 1e6 for each in TERMS["temporal"] for x in (*each.mean_rad, *each.sigma_rad)],
+     [
+        41.0, 41.0, 0.0, 0.0, 0.0, 0.0, 25.8093975, 25.8093975, 27.5, 0.0, 15.8771324, 0.0, 51.0, 51.0, 0.0,
+        0.0,
+    ]),
+    (lambda: [x * 1e6 for each in TERMS["mixed"] for x in (*each.mean_rad, *each.sigma_rad)],
+     [
+        0.0, 0.0, 23.671361, 23.671361, 0.0, 0.0, 25.8093975, 25.8093975, 0.0, 0.0, 10.5847549, 0.0, 0.0, 0.0,
+        17.0, 17.0,
+    ]),
+    (lambda: [each.total_rad * 1e6 for each in summation.summations(TERMS["temporal"], 0.95)],
+     [101.607086, 186.0, 178.890736, 228.825758, 74.1715085, 200.273085]),
+    (lambda: [each.total_rad * 1e6 for each in summation.summations(TERMS["mixed"], 0.9)],
+     [101.607086, 186.0, 66.3570603, 92.21387, 86.573051, 85.0741786]),
+    (lambda: [x * 1e6 for x in summation.axis_totals_rad(TERMS["temporal"], 0.99)], [197.552658, 158.480602]),
+    (lambda: [summation.sigma_multiple(0.9), summation.sigma_multiple(0.9973)], [1.64485363, 2.99997699]),
+])  # fmt: skip
+def test_sums_of_errors_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: [error_classes.basis(each) for each in MIXED],
+            [
+                "bias, bound, about each axis: mean error, constant; worst-case satellite (temporal)",
+                "random, 2-sigma, radial: mean 0, standard deviation error / (2 sqrt(2)) over time",
+                (
+                    "drift, 3-sigma, about one axis: ramp from zero to error, mean 1/2 and standard deviation "
+                    "1/sqrt(12) of it; worst-case satellite (temporal)"
+                ),
+                (
+                    "transient, 1-sigma, about each axis: mean 3 error, counted as always present; worst-case "
+                    "satellite (temporal)"
+                ),
+            ],
+        ),
+        (
+            lambda: [error_classes.basis(each, "mixed") for each in MIXED],
+            [
+                (
+                    "bias, bound, about each axis: mean 0, standard deviation error / sqrt(3), evenly up to "
+                    "the bound; random satellite at a random time (mixed)"
+                ),
+                (
+                    "random, 2-sigma, radial: mean 0, standard deviation error / (2 sqrt(2)); random satellite "
+                    "at a random time (mixed)"
+                ),
+                (
+                    "drift, 3-sigma, about one axis: mean 0, standard deviation error / 3 / sqrt(3), ramp from "
+                    "zero; random satellite at a random time (mixed)"
+                ),
+                (
+                    "transient, 1-sigma, about each axis: mean 0, standard deviation error / 1, counted as "
+                    "always present; random satellite at a random time (mixed)"
+                ),
+            ],
+        ),
+        (
+            lambda: [
+                error_classes.basis(stated("bias", "1-sigma", "radial")),
+                error_classes.basis(stated("random", "bound", "x")),
+            ],
+            [
+                (
+                    "bias, 1-sigma, radial: mean 3 error / sqrt(2) about each axis, constant; worst-case "
+                    "satellite (temporal)"
+                ),
+                (
+                    "random, bound, about one axis: mean 0, standard deviation error / sqrt(3), evenly up to "
+                    "the bound over time"
+                ),
+            ],
+        ),
+        (
+            lambda: [
+                f"{each.rule}: {each.name}, {each.caveat}" for each in summation.summations(TERMS["temporal"], 0.95)
+            ],
+            [
+                "rss: root sum square, not authorised: mount, heat, slew have means, and means add linearly",
+                (
+                    "esa-1993: class by class, ECSS-E-ST-60-10C (2008) A.2.3: no mathematical justification, "
+                    "can overestimate; not recommended (4.2.3 NOTE 8)"
+                ),
+                "ecss-axis: ECSS, one axis, ",
+                "ecss-radial: ECSS, two axes, ",
+                (
+                    "rayleigh: ECSS, two like axes, does not apply: the mean is not 10 times below the "
+                    "standard deviation"
+                ),
+                "exact: radial distribution, ",
+            ],
+        ),
+    ],
+)
+def test_the_words_of_each_error_say_its_class_and_its_formula(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [x * 1e6 for each in summation.allocate(MIXED, 300.0 * URAD, rule="ecss-radial",
+            confidence=0.95) for x in (each.stated_rad, each.largest_rad, each.missing_rad)],
+     [
+        41.0, 91.6145627, 0.0, 73.0, 148.886899, 0.0, 55.0, 148.087147, 0.0, 17.0, 33.8715209, 0.0,
+    ]),
+    (lambda: [x * 1e6 for each in summation.allocate(MIXED, 150.0 * URAD, rule="exact", confidence=0.9,
+            interpretation="mixed") for x in (each.largest_rad, each.missing_rad)],
+     [107.814018, 0.0, 178.44691, 0.0, 407.164777, 0.0, 60.0273893, 0.0]),
+    (lambda: [x * 1e6 for each in summation.allocate(MIXED, 97.5 * URAD, rule="ecss-radial",
+            confidence=0.95) for x in (each.largest_rad, each.missing_rad)],
+     [0.0, 74.126021, 0.0, 84.4305767, 0.0, 104.146333, 0.0, 60.3464263]),
+])  # fmt: skip
+def test_what_a_total_leaves_for_each_error(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: StatedError("mount", -2.5e-6, "bias", "bound", "x"),
+            ValueError,
+            "mount: the error is -2.5 µrad: it must be finite, at least 0 rad; it is a half width",
+        ),
+        (
+            lambda: StatedError("mount", 2.5e-6, "noise", "bound", "x"),
+            ValueError,
+            'mount: no kind "noise"; give one of bias, random, drift, transient',
+        ),
+        (
+            lambda: StatedError("mount", 2.5e-6, "bias", "4-sigma", "x"),
+            ValueError,
+            'mount: no statistic "4-sigma"; give one of 1-sigma, 2-sigma, 3-sigma, bound',
+        ),
+        (
+            lambda: StatedError("mount", 2.5e-6, "bias", "bound", "y"),
+            ValueError,
+            'mount: no axes "y"; give one of per-axis, radial, x',
+        ),
+        (lambda: error_term(MIXED[0], "worst"), ValueError, 'no interpretation "worst"; give one of temporal, mixed'),
+        (lambda: term(mean=(0.0, math.inf)), ValueError, "term: the mean is inf rad: it must be finite"),
+        (
+            lambda: term(sigma=(1e-6, -2.5e-6)),
+            ValueError,
+            "term: the standard deviation is -2.5 µrad: it must be finite, at least 0 rad",
+        ),
+        (
+            lambda: summation.allocate(MIXED, -3e-6, rule="exact", confidence=0.9),
+            ValueError,
+            "the total is -3 µrad: it must be finite, above 0 rad; else nothing is left to allocate",
+        ),
+        (
+            lambda: summation.allocate(MIXED, 3e-6, rule="linear", confidence=0.9),
+            ValueError,
+            'no rule "linear" to allocate by; give one of rss, esa-1993, ecss-axis, ecss-radial, exact',
+        ),
+        (
+            lambda: summation.sigma_multiple(1.5),
+            ValueError,
+            "the confidence is 1.5: it must be finite, above 0 and below 1",
+        ),
+    ],
+)
+def test_a_refusal_of_a_stated_error_says_its_name(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words

@@ -394,3 +394,108 @@ def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_inter
 def test_what_is_not_possible_is_refused_in_words(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+SKEW = Jitter((1.3 * URAD, -2.6 * URAD), (0.9 * URAD, 2.1 * URAD))
+SPEED = (0.7e-3, 1.9e-3)
+SPECTRUM = pf.motion_of_spectrum(
+    [0.5, 2.0, 7.0, 30.0, 80.0], [[3e-13, 2e-13, 5e-14, 3e-15, 1e-16], [7e-13, 1e-13, 9e-14, 1e-14, 3e-15]]
+)
+ENDS = (
+    pf.MovingEnd(SKEW, SPEED, 9.0 * URAD),
+    pf.MovingEnd(Jitter((0.4e-6, 0.2e-6), (0.6e-6, 0.3e-6)), (0.2e-3, 0.1e-3), 7.0 * URAD),
+)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [*(x * 1e6 for x in SPECTRUM.rms_rad), *(x * 1e6 for x in SPECTRUM.velocity_rms_rad_s),
+            *SPECTRUM.top_octave_share, SPECTRUM.highest_hz],
+     [1.29884564, 1.59687194, 77.3383928, 185.50526, 0.386518708, 0.693839564, 80.0]),
+    (lambda: pf.level_crossing_rate_hz(SKEW, SPEED, [1.0 * URAD, 4.0 * URAD, 8.0 * URAD]),
+     [57.9980205, 129.429629, 6.54188395]),
+    (lambda: [float(x) for each in [pf.fades(SKEW, SPEED, 9.0 * URAD, [1.5,
+            4.0])] for part in (each.per_second, each.mean_duration_s,
+            each.share_of_time) for x in part],
+     [138.14806, 42.7153959, 0.00263227695, 0.00139327573, 0.363643955, 0.0595143242]),
+    (lambda: [float(x) for each in [pf.fades_of_both(*ENDS, 3.0)] for x in (each.per_second,
+            each.mean_duration_s, each.share_of_time)],
+     [78.8807903, 0.00172822609, 0.13632384]),
+    (lambda: [pf.mean_error_ratio(SKEW, 9.0 * URAD, 1.5, lambda power: 0.5 * np.exp(-6.0 * power)),
+            pf.uncoded_penalty_db(SKEW, 9.0 * URAD, lambda power: 0.5 * np.exp(-6.0 * power))],
+     [0.00447568531, 3.21807978]),
+    (lambda: [*ps.mean_loss_db(SKEW, [6e-6, 9e-6]), *ps.outage_probability(SKEW, 9e-6, [0.5, 4.0]),
+            *ps.outage_loss_db(SKEW, 9e-6, [0.02, 0.6])],
+     [2.52179263, 1.28252258, 0.737415981, 0.0595143242, 5.42622405, 0.79030147]),
+    (lambda: [*ps.transmission([2e-6, 5e-6], 9e-6), *ps.radius_of_loss_rad(9e-6, [0.7, 3.0])],
+     [0.905955191, 0.539407507, 2.55496159e-06, 5.289273e-06]),
+])  # fmt: skip
+def test_motions_and_fades_of_numbers_unlike_each_other(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (
+            lambda: pf.motion_of_spectrum([0.5, 2.0, 7.0], [[3e-13, 2e-13, 5e-14]]),
+            ValueError,
+            (
+                "frequencies of shape (3,) and spectral densities of shape (1, 3) do not fit; give "
+                "(freqs,) with at least 2 of them, and (2, freqs)"
+            ),
+        ),
+        (
+            lambda: pf.motion_of_spectrum([0.5, 7.0, 2.0], [[3e-13, 2e-13, 5e-14]] * 2),
+            ValueError,
+            "the frequencies do not rise from 0 Hz or above; sort them, each once",
+        ),
+        (
+            lambda: pf.motion_of_spectrum([0.5, 2.0, 7.0], [[3e-13, -2e-13, 5e-14]] * 2),
+            ValueError,
+            "the spectral density is -2e-13 rad^2/Hz: it must be finite, at least 0 rad^2/Hz",
+        ),
+        (
+            lambda: pf.level_crossing_rate_hz(SKEW, (0.7e-3, 0.0), 1e-6),
+            ValueError,
+            (
+                "axis y has a jitter rms of 2.1 µrad and a velocity rms of 0 rad/s; give both above 0, or "
+                "both 0 and the standing error as its bias"
+            ),
+        ),
+        (
+            lambda: pf.level_crossing_rate_hz(SKEW, (0.7e-3, -1e-3), 1e-6),
+            ValueError,
+            "the velocity rms of axis y is -1 mrad/s: it must be finite, at least 0 rad/s",
+        ),
+        (
+            lambda: pf.uncoded_penalty_db(SKEW, 9.0 * URAD, lambda power: 0.0 * power),
+            ValueError,
+            "the bit error ratio at power 1 is 0; it is the target and must be between 0 and 1",
+        ),
+        (
+            lambda: pf.uncoded_penalty_db(SKEW, 9.0 * URAD, lambda power: 1.0 - np.exp(-power)),
+            ValueError,
+            "the bit error ratio grows with the power; give a curve that falls",
+        ),
+        (
+            lambda: pf.uncoded_penalty_db(SKEW, 9.0 * URAD, lambda power: 2.0 + 0.0 * power),
+            ValueError,
+            "the bit error ratio does not give one value from 0 to 1 for each power; correct the curve",
+        ),
+        (
+            lambda: Jitter((1e-6, 2e-6), (1e-6, -2.5e-6)),
+            ValueError,
+            "the jitter rms is -2.5 µrad: it must be finite, at least 0 rad",
+        ),
+        (
+            lambda: Jitter((1e-6, 2e-6, 3e-6), (1e-6, 2.5e-6)),
+            ValueError,
+            "the bias is (1e-06, 2e-06, 3e-06) rad; give two values, for axis x and axis y",
+        ),
+        (lambda: Jitter((1e-6, math.nan), (1e-6, 2.5e-6)), ValueError, "the bias is nan rad: it must be finite"),
+    ],
+)
+def test_a_refusal_of_motions_and_fades_says_its_numbers(call, error, words):
+    with pytest.raises(error) as refused:
+        call()
+    assert str(refused.value) == words

@@ -442,3 +442,19 @@ def test_a_swing_goes_a_tenth_or_half_a_decibel_to_either_side_and_half_way_to_a
     field, value, rule, strehl, ends
 ):
     assert variation._ends(field, value, rule, strehl) == pytest.approx(ends, abs=1e-12)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: variation._ends("transmit_power_w", 4.6, Quantity("W", above=0.0), "decibel"), [4.14, 5.06]),
+    (lambda: variation._ends("margin_db", 0.3, Quantity("dB", least=0.0), "decibel"), [0.0, 0.8]),
+    (lambda: variation._ends("strehl", 0.97, Quantity("", above=0.0), "ratio"), [0.873, 1.0]),
+    (lambda: variation._ends("strehl", 0.3, Quantity("", least=0.0), "decibel"), [0.0, 0.8]),
+    (lambda: variation._ends("outage", 0.02, Share(""), "ratio"), [0.002, 0.2]),
+    (lambda: variation._ends("outage", 0.3, Share(""), "ratio"), [0.03, 0.65]),
+    (lambda: variation._ends("bit_error_ratio", 3e-18, Share("", least=1e-18, below=0.5), "ratio"),
+     [1e-18, 3e-17]),
+    (lambda: variation._ends("bias_rad", -2e-6, Quantity("rad"), "ratio"), [-2.2e-06, -1.8e-06]),
+    (lambda: variation._ends("efficiency", 0.96, Quantity("", above=0.0, most=1.0), "ratio"), [0.864, 1.0]),
+])  # fmt: skip
+def test_an_input_is_moved_within_its_bounds(found, expected):
+    assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
