@@ -20,6 +20,7 @@ from microrad.orbit.from_mission import TAIL_S
 from microrad.orbit.propagation.analytic import node_of_local_time
 from microrad.orbit.propagation.ephemeris import EphemerisOrbit
 from microrad.orbit.visibility.limits import UNLIMITED
+from optical_files import optical
 
 C_M_S = 299_792_458.0
 EARTH_POLAR_M = EARTH_RADIUS_M * (1.0 - 1.0 / 298.257223563)
@@ -1120,3 +1121,186 @@ def of_seen(*contacts):
 )
 def test_parts_of_a_day_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+# ------------------------------------------------------------------------------- all numbers unlike each other
+UNLIKE_DAY = {
+    "orbit.duration": "9 h",
+    "orbit.grazing_height": "70 km",
+    "orbit.leo.altitude": "630 km",
+    "orbit.leo.local_time": "8.25 h",
+    "orbit.leo.phase": "40 deg",
+    "orbit.leo.limits.slew_limit": "0.4 deg/s",
+    "orbit.leo.limits.sun_exclusion": "7 deg",
+    "orbit.geo.longitude": "127 deg",
+    "orbit.geo.limits.field_of_regard": "9.7 deg",
+    "orbit.geo.limits.sun_exclusion": "4 deg",
+    "operations.instrument_rate": "4.5 Mbit/s",
+    "operations.store": "5 GB",
+    "operations.margin": "2.2 dB",
+    "operations.relay_share": 0.8,
+    "operations.rates": ["51.84 Mbit/s", "155.52 Mbit/s", "622.08 Mbit/s"],
+    "operations.runs": 3,
+    "operations.seed": 7,
+    "operations.relay_delay": "0.7 s",
+    "operations.downlink.data_rate": "260 Mbit/s",
+    "operations.downlink.setup": "25 s",
+    "operations.downlink.delay": "3 s",
+    "operations.downlink.stations.kiruna.mask": "7 deg",
+    "operations.downlink.stations.perth": {
+        "latitude": "-31.8 deg",
+        "longitude": "115.9 deg",
+        "height": "22 m",
+        "mask": "11 deg",
+    },
+}
+CLEAR = {"kiruna": 0.4, "tromso": 0.55, "tenerife": 0.85}
+LASERS = {
+    "data_rate": "1.3 Gbit/s",
+    "setup": "45 s",
+    "delay": "2 s",
+    "weather": "90 min",
+    "correlation_length": "700 km",
+}
+
+
+@pytest.fixture(scope="module")
+def unlike_day(tmp_path_factory):
+    """Nine hours of a mission whose numbers are all unlike each other, by relay, radio and laser."""
+    folder = tmp_path_factory.mktemp("unlike")
+    return day_study.run_day_study(
+        link_study.run_link_study(day_file(folder, ALONE, UNLIKE_DAY, optical(CLEAR, **LASERS)))
+    )
+
+
+def way_named(name):
+    def of(day):
+        (way,) = [each for each in day.ways if each.name == name]
+        found = [way.contact_s, way.gap_s, way.capacity_bit, *way.capacity_spread_bit, way.generated_bit, way.lost_bit]
+        found += [way.on_board_bit, way.arrived_bit, way.failed_contacts, way.median_s, way.slow_s]
+        return [*found, *way.carried_bit, *(x for c in way.contacts for x in (c.start_s, c.end_s))]
+
+    return of
+
+
+def view_of(day):
+    v = day.view
+    names = ("range_least_m", "range_most_m", "point_ahead_most_rad", "rate_most_rad_s", "acceleration_most_rad_s2")
+    most = [v.largest(name) for name in (*names, "range_rate_most_m_s", "doppler_most_hz")]
+    return [v.contact_s, v.gap_s, v.days, v.visible_share, v.rises, v.median_s, *most, *v.umbra_s.ravel()]
+
+
+def swings_of(day):
+    ends = [(s.at_low, s.at_high) for s in sorted(day.swings, key=lambda s: s.name)]
+    numbers = [n for both in ends for n in both]
+    return [x for n in numbers for x in (n.relay_bit, n.direct_bit, n.optical_bit)]
+
+
+def sky_of(day):
+    s = day.sky
+    return [*s.availability, *s.drawn, s.any_clear, s.any_drawn, s.any_independent, *s.correlation.ravel()]
+
+
+def closings_of(day):
+    ratios = [day.ratio, day.optical_ratio, day.loss.loss_db, day.loss.outage]
+    return [*(x for c in day.closings for x in (c.rate_bit_s, c.margin_db, c.largest_range_m)), *ratios]
+
+
+@pytest.mark.parametrize(("of", "expected"), [
+    (way_named("relay"), [
+        18166.6029, 3167.63939, 2812301620000.0, 2810995070000.0, 2813064040000.0, 145800000000.0, 0.0, 0.0,
+        145800000000.0, 0.0, 0.7, 2967.99402, 418553461000.0, 430489610000.0, 475791967000.0, 1025201610000.0,
+        462264974000.0, 559.381843, 3266.3949, 6311.26442, 9095.02741, 11940.8989, 15015.9579, 17039.0389,
+        23646.8245, 26814.4639, 29807.4461,
+    ]),
+    (way_named("direct downlink"), [
+        1905.20578, 15550.2346, 469353502000.0, 469353502000.0, 469353502000.0, 145800000000.0, 30088555900.0,
+        0.0, 115711444000.0, 0.0, 4014.52153, 15325.5485, 111434480000.0, 69531306500.0, 138756576000.0,
+        149631139000.0, 2546.20856, 2999.80271, 18550.0374, 18842.4655, 24282.7346, 24841.4137, 30069.2007,
+        30669.7051,
+    ]),
+    (way_named("optical downlink"), [
+        1447.76594, 20399.6131, 1662075410000.0, 801064815000.0, 2316279700000.0, 145800000000.0, 56771103800.0,
+        0.0, 89028896200.0, 0.0, 9071.90451, 23686.3419, 149132656000.0, 149938517000.0, 484333110000.0,
+        527421866000.0, 351249265000.0, 18467.5501, 18856.7024, 18500.476, 18891.4879, 24230.8134, 24834.6593,
+        30021.3146, 30674.8783, 30915.6066, 31230.7983,
+    ]),
+    (view_of, [
+        22708.2536, 2368.11627, 0.375, 0.700872025, 5.0, 3741.2278, 41116813.8, 44464923.1, 7.00901002e-05,
+        0.000252565581, 2.24204467e-07, 7533.47237, 4860304750.0, 1444.38032, 2704.36443, 7291.19513,
+        8551.05795, 13138.0093, 14397.7522, 18984.8228, 20244.4472, 24831.6357, 26091.143, 30678.448,
+        31937.8394,
+    ]),
+    (swings_of, [
+        355581961000.0, 469353502000.0, 1662075410000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        2812301620000.0, 469353502000.0, 889176321000.0, 2812301620000.0, 469353502000.0, 2316279700000.0,
+        2812301620000.0, 469353502000.0, 1924566660000.0, 2812301620000.0, 469353502000.0, 1397558620000.0,
+        2114627440000.0, 469353502000.0, 1662075410000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        2812301620000.0, 777249569000.0, 1662075410000.0, 2812301620000.0, 266196904000.0, 1662075410000.0,
+        2879125280000.0, 469353502000.0, 1662075410000.0, 2745902180000.0, 469353502000.0, 1662075410000.0,
+        2812301620000.0, 111434480000.0, 1662075410000.0, 2812301620000.0, 734038667000.0, 1662075410000.0,
+        2812301620000.0, 469353502000.0, 1662075410000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        2628988140000.0, 437088513000.0, 1700902720000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        7012646190000.0, 469353502000.0, 1662075410000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        2812301620000.0, 469353502000.0, 831037707000.0, 2812301620000.0, 469353502000.0, 3324150830000.0,
+        2812301620000.0, 469353502000.0, 1512136900000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        2697938500000.0, 329792426000.0, 982602012000.0, 2287151290000.0, 572776901000.0, 2177949130000.0,
+        7164793500000.0, 469353502000.0, 1662075410000.0, 2812301620000.0, 469353502000.0, 1662075410000.0,
+        2812301620000.0, 234676751000.0, 1662075410000.0, 2812301620000.0, 938707004000.0, 1662075410000.0,
+        2818785850000.0, 469353502000.0, 1662075410000.0, 2799333160000.0, 469353502000.0, 1662075410000.0,
+        2812301620000.0, 469353502000.0, 1773945680000.0, 2812301620000.0, 469353502000.0, 1661269550000.0,
+    ]),
+    (sky_of, [
+        0.4, 0.55, 0.85, 0.5, 0.611111111, 1.0, 0.941090301, 1.0, 0.9595, 1.0, 0.734208041, 0.000735424906,
+        0.734208041, 1.0, 0.000658682757, 0.000735424906, 0.000658682757, 1.0,
+    ]),
+    (closings_of, [
+        622080000.0, -0.166855804, 31982064.9, 155520000.0, 5.85374411, 63964129.8, 51840000.0, 10.6249567,
+        110789123.0, 5.99186244, 1.69204213, 2.23013253, 0.0,
+    ]),
+])  # fmt: skip
+def test_a_day_of_numbers_unlike_each_other(unlike_day, of, expected):
+    assert of(unlike_day) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+def test_the_sides_of_each_assumption_of_a_day_are_written_with_their_units(unlike_day):
+    assert {s.name: (s.low, s.high) for s in unlike_day.swings} == {
+        "attitude of the satellite": ("nadir, 60 deg about zenith", "as it is"),
+        "availability of the optical stations": ("half", "no clouds"),
+        "correlation length of clouds": ("none", "1400 km"),
+        "eclipse": ("terminal off in it", "as it is"),
+        "elevation mask": ("0 deg", "twice"),
+        "grazing height": ("0 m", "140 km"),
+        "ground stations": ("without kiruna", "one more, opposite kiruna"),
+        "instrument data rate": ("2.25 Mbit/s", "9 Mbit/s"),
+        "local time of the node": ("6 h later", "as it is"),
+        "margin demanded of the laser link": ("0 dB", "4.4 dB"),
+        "optical data rate to ground": ("650 Mbit/s", "2.6 Gbit/s"),
+        "optical ground stations": ("without kiruna", "as it is"),
+        "orbit altitude": ("504 km", "756 km"),
+        "pointing loss": ("0 dB", "3 dB more"),
+        "radio data rate": ("130 Mbit/s", "520 Mbit/s"),
+        "time of acquisition": ("half", "twice"),
+        "time that weather holds": ("0.75 h", "3 h"),
+    }
+
+
+def test_each_contact_of_a_day_says_its_ends_and_its_station(unlike_day):
+    assert [(c.begins, c.ends) for c in unlike_day.relay.contacts] == [
+        ("Earth", "end of the relay's share"),
+        ("Earth", "end of the relay's share"),
+        ("Earth", "end of the relay's share"),
+        ("Earth", "end of the relay's share"),
+        ("Earth", "end of the relay's share"),
+    ]
+    assert [(c.begins, c.ends) for c in unlike_day.direct.contacts] == [
+        ("elevation mask of perth", "elevation mask of perth"),
+        ("elevation mask of kiruna", "elevation mask of kiruna"),
+        ("elevation mask of kiruna", "elevation mask of kiruna"),
+        ("elevation mask of kiruna", "elevation mask of kiruna"),
+    ]
+    assert [way.stations for way in unlike_day.ways] == [
+        (),
+        ("perth", "kiruna", "kiruna", "kiruna"),
+        ("tromso", "kiruna", "tromso", "tromso", "tenerife"),
+    ]
