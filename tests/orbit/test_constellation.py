@@ -27,7 +27,7 @@ from microrad.report.day.constellation import (
     plan_text,
     satellites_table,
 )
-from optical_files import shared_stations
+from optical_files import SITES, shared_stations
 
 SIX_HOURS = {"orbit.duration": "6 h"}
 TWO_TERMINALS = {"constellation.terminals": 2}
@@ -528,3 +528,133 @@ def test_a_constellation_repeats_elements_or_has_a_file(tmp_path, changes, has):
     assert from_mission.repeats(m.constellation, m.orbit) == has
     slot = m.orbit.model_copy(update={"leo": m.orbit.geo})
     assert from_mission.repeats(m.constellation, slot) == (m.constellation.pattern == "file")
+
+
+# ------------------------------------------------------------------------------- all numbers unlike each other
+UNLIKE_PLAN = {
+    "orbit.duration": "3 h",
+    "orbit.leo.altitude": "710 km",
+    "orbit.leo.phase": "25 deg",
+    "orbit.grazing_height": "60 km",
+    "operations.margin": "1.3 dB",
+    "operations.rates": ["77.76 Mbit/s", "311.04 Mbit/s"],
+    "constellation.satellites": 6,
+    "constellation.planes": 2,
+    "constellation.phasing": 1,
+    "constellation.terminals": 2,
+    "constellation.overhead": "45 s",
+    "constellation.session": "7 min",
+    "constellation.shortest": "130 s",
+    "constellation.relays": {"east": {"longitude": "131 deg"}, "west": {"longitude": "-52 deg"}},
+    "constellation.stations": {
+        "kiruna": {**SITES["kiruna"], "data_rate": "1.3 Gbit/s", "terminals": 1, "availability": 0.4},
+        "tenerife": {**SITES["tenerife"], "data_rate": "0.7 Gbit/s", "terminals": 2, "availability": 0.85},
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def unlike_plan(tmp_path_factory):
+    """Seven hours of six satellites, two relays and two stations whose numbers are all unlike each other."""
+    return planned(tmp_path_factory.mktemp("unlike"), UNLIKE_PLAN)[0]
+
+
+def totals_of(name):
+    def of(found):
+        t = getattr(found, name)
+        return [*t.sessions, *t.busy_s, *t.served_s, *t.volume_bit, *t.longest_gap_s]
+
+    return of
+
+
+def first_sessions(found):
+    names = ("start_s", "locked_s", "end_s", "rate_bit_s", "volume_bit", "range_min_m", "range_max_m")
+    return [getattr(one, name) for one in found.planned[:9] for name in names]
+
+
+def use_of(found):
+    return [found.volume_bit, *found.use, *found.station_use, len(found.planned), found.opportunities.start_s.size]
+
+
+@pytest.mark.parametrize(("of", "expected"), [
+    (totals_of("by_satellite"), [
+        15.0, 13.0, 12.0, 14.0, 15.0, 13.0, 7279.82385, 7999.11566, 7995.10863, 8089.04858, 7574.37402,
+        8020.88784, 6604.82385, 7414.11566, 7455.10863, 7459.04858, 6899.37402, 7435.88784, 2054364410000.0,
+        2306086530000.0, 2318836990000.0, 2614468600000.0, 2355913950000.0, 2584442040000.0, 465.0, 465.0,
+        465.0, 465.0, 465.0, 465.0,
+    ]),
+    (totals_of("by_relay"), [
+        37.0, 37.0, 21600.0, 21600.0, 19935.0, 19935.0, 6200582400000.0, 6200582400000.0, 45.0, 45.0,
+    ]),
+    (totals_of("by_station"), [
+        6.0, 2.0, 2791.00843, 967.35015, 2521.00843, 877.35015, 1310924390000.0, 522023339000.0, 1643.57656,
+        7569.18624,
+    ]),
+    (first_sessions, [
+        0.0, 45.0, 420.0, 311040000.0, 116640000000.0, 36038123.9, 37353656.0, 0.0, 45.0, 420.0, 311040000.0,
+        116640000000.0, 42058206.6, 44541664.7, 0.0, 45.0, 420.0, 311040000.0, 116640000000.0, 36704375.2,
+        38214762.8, 0.0, 45.0, 420.0, 311040000.0, 116640000000.0, 40996990.3, 43481073.0, 420.0, 465.0, 1260.0,
+        311040000.0, 247276800000.0, 35777237.4, 37269057.2, 420.0, 465.0, 1260.0, 311040000.0, 247276800000.0,
+        35777237.4, 37269057.2, 420.0, 465.0, 840.0, 311040000.0, 116640000000.0, 38452741.7, 40748247.3, 420.0,
+        465.0, 840.0, 311040000.0, 116640000000.0, 38452741.7, 40748247.3, 420.0, 465.0, 668.647756,
+        1300000000.0, 105896833000.0, 1459446.29, 2618394.85,
+    ]),
+    (use_of, [
+        14234112500000.0, 1.0, 1.0, 0.258426707, 0.0447847292, 82.0, 40.0,
+    ]),
+])  # fmt: skip
+def test_a_plan_of_numbers_unlike_each_other(unlike_plan, of, expected):
+    assert of(unlike_plan) == pytest.approx(expected, rel=1e-6, abs=0.0)
+
+
+def test_a_plan_serves_each_by_its_name(unlike_plan):
+    served = [(one.satellite, one.relay) for one in unlike_plan.planned[:24]]
+    assert served == [
+        ("1-2", "east"),
+        ("1-3", "east"),
+        ("1-1", "west"),
+        ("2-1", "west"),
+        ("2-3", "east"),
+        ("1-2", "east"),
+        ("2-2", "west"),
+        ("1-1", "west"),
+        ("2-1", "kiruna"),
+        ("2-1", "tenerife"),
+        ("1-3", "west"),
+        ("2-2", "west"),
+        ("1-1", "east"),
+        ("2-3", "east"),
+        ("2-1", "west"),
+        ("1-2", "east"),
+        ("2-2", "east"),
+        ("2-3", "west"),
+        ("1-1", "east"),
+        ("1-2", "east"),
+        ("2-1", "west"),
+        ("1-3", "west"),
+        ("2-3", "kiruna"),
+        ("2-2", "east"),
+    ]
+    assert (unlike_plan.satellites, unlike_plan.relays, unlike_plan.stations, unlike_plan.station_terminals) == (
+        ("1-1", "1-2", "1-3", "2-1", "2-2", "2-3"),
+        ("east", "west"),
+        ("kiruna", "tenerife"),
+        (1, 2),
+    )
+    assert unlike_plan.contact_plan().split("\n")[1:16] == [
+        '# node 1 is "1-1"',
+        '# node 2 is "1-2"',
+        '# node 3 is "1-3"',
+        '# node 4 is "2-1"',
+        '# node 5 is "2-2"',
+        '# node 6 is "2-3"',
+        '# node 7 is "east"',
+        '# node 8 is "west"',
+        '# node 9 is "kiruna"',
+        '# node 10 is "tenerife"',
+        "@ 2026/03/20-12:00:00",
+        "a contact +45 +420 1 8 38880000",
+        "a range +45 +420 1 8 1",
+        "a contact +45 +420 2 7 38880000",
+        "a range +45 +420 2 7 1",
+    ]
