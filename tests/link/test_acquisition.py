@@ -334,7 +334,7 @@ def test_what_no_acquisition_has_is_refused_with_the_limit(call, message):
     ("call", "error", "words"),
     [
         (
-            lambda: Stage("GEO detects", 2.5, 0.75, timeout_s=0.125),
+            lambda: Stage("GEO detects", 2.5, 0.75, 0.125),
             ValueError,
             ('the stage "GEO detects" lasts 2.5 s and its time-out is 125 ms: the time-out must not be shorter'),
         ),
@@ -356,7 +356,7 @@ def test_what_no_acquisition_has_is_refused_with_the_limit(call, message):
             'the duration of the stage "LEO locks" is -1.5 s: it must be finite, at least 0 s',
         ),
         (
-            lambda: Stage("LEO locks", 1.5, 0.5, timeout_s=math.inf),
+            lambda: Stage("LEO locks", 1.5, 0.5, math.inf),
             ValueError,
             'the time-out of the stage "LEO locks" is inf s: it must be finite, at least 0 s',
         ),
