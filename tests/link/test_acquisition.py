@@ -339,9 +339,7 @@ def test_what_no_acquisition_has_is_refused_with_the_limit(call, message):
             ('the stage "GEO detects" lasts 2.5 s and its time-out is 125 ms: the time-out must not be shorter'),
         ),
         (
-            lambda: Stage(
-                "GEO turns", TimeDistribution(np.array([1.0, 4.5]), np.array([0.5, 0.25])), 0.5, timeout_s=3.25
-            ),
+            lambda: Stage("GEO turns", TimeDistribution(np.array([1.0, 4.5]), np.array([0.5, 0.25])), 0.5, 3.25),
             ValueError,
             ('the stage "GEO turns" lasts 4.5 s and its time-out is 3.25 s: the time-out must not be shorter'),
         ),
