@@ -1,6 +1,7 @@
 """Hysteresis models by themselves: arrays in, arrays out, beside the slow twins of the kernels and the whole mirror."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -281,3 +282,22 @@ def test_whole_parameters_compile_nothing_of_their_own():
         BoucWen(1, 0, -1, 0, 1, 0).response(DRIVE, STEP),
         BoucWen(*map(float, (1, 0, -1, 0, 1, 0))).response(DRIVE, STEP),
     )
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (
+            lambda: mirror.Mirror.of([[50e-6, 3e-6], [2e-6, 40e-6]], [1.0], [1e-8, 1e-4, 1.0]),
+            "d1_rad_v of the Bouc-Wen model has shape (2, 2): give one number",
+        ),
+        (
+            lambda: BoucWen(1.0, [0.0], 0.0, 0.0, 0.0, 0.0).check(),
+            "d2_s_v of the Bouc-Wen model has shape (1,): give one",
+        ),
+        (lambda: Creep(1.0, (2.0,)).check(), "weights_rad_v of the creep model has shape (): give a row of numbers"),
+    ],
+)
+def test_a_parameter_is_one_number_or_a_row(call, said):
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}"):
+        call()

@@ -78,9 +78,12 @@ class _Numbers:
     KIND: ClassVar[str]
 
     def check(self) -> None:
-        """Raises ValueError for a parameter that is no finite number; a limit may be infinite."""
+        """Raises ValueError for a parameter that is no finite number, or row of them; a limit may be infinite."""
         for each in fields(self):  # type: ignore[arg-type]
             values = reals(getattr(self, each.name), f"{each.name} of the {self.KIND} model")
+            if values.ndim != (each.type is not float):
+                wanted = "one number" if each.type is float else "a row of numbers"
+                raise ValueError(f"{each.name} of the {self.KIND} model has shape {values.shape}: give {wanted}")
             if not np.all(np.isfinite(values) | (each.name in _LIMITS and values == math.inf)):
                 raise ValueError(f"{each.name} of the {self.KIND} model is {values}: give finite numbers")
 
