@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from drawn import figure_of
 from microrad.report import columns_csv
 from microrad.report.day import figures
 from microrad.report.day import world_map as world
@@ -733,3 +734,326 @@ def test_the_contact_drawn_is_the_one_the_mission_names_or_the_first(monkeypatch
     none = a_log_and_view(operations=operations)
     none.view.encounters = []
     assert figures._along_figure(none) == []
+
+
+def array(*values):
+    return np.array(values, dtype=np.float64)
+
+
+# ------------------------------------------------------------------------------------------------ figures as a whole
+def test_a_timeline_of_three_kinds_has_every_bar_colour_sum_and_round_hour():
+    rows = [("relay", array([0, 600], [7200, 9000])), ("direct: a", array([3600, 3900])), ("eclipse", array([5, 4205]))]
+    rows.insert(2, ("direct: b", np.empty((0, 2))))
+    assert figure_of(timeline(rows, (1800.0, 12600.0), EPOCH)) == [
+        "day-timeline",
+        "Contacts over time",
+        (
+            "From 0.5 h to 3.5 h after 2026-03-20T12:00:00Z. At the right of each row: how "
+            "many intervals, and how long they are together."
+        ),
+        {
+            "relay, start (s)": [0.0, 7200.0],
+            "relay, end (s)": [600.0, 9000.0],
+            "direct: a, start (s)": [3600.0],
+            "direct: a, end (s)": [3900.0],
+            "direct: b, start (s)": [],
+            "direct: b, end (s)": [],
+            "eclipse, start (s)": [5.0],
+            "eclipse, end (s)": [4205.0],
+        },
+        "Sheet width=7.6 height=1.88",
+        ("Panel 0 0 x=<title=hours since 2026-03-20T12:00:00Z low=0.5 high=3.5 ticks=[0.5 0.75 1 1.25 1.5"),
+        "  1.75 2 2.25 2.5 2.75 3 3.25 3.5]> y=<low=3.6 high=-0.6 ticks={0: relay, 1: direct: a, 2:",
+        "  direct: b, 3: eclipse} grid=False>",
+        ("Bars at=[0 0] start=[0 2] end=[0.166667 2.5] breadth=[0.68 0.68] colour=#0072B2 edge=#0072B2"),
+        "Words text=2 · 40 min x=1 y=0 size=9 shift=[5 0] of_panel=x",
+        "Bars at=[1] start=[1] end=[1.08333] breadth=[0.68] colour=#E69F00 edge=#E69F00",
+        "Words text=1 · 5 min x=1 y=1 size=9 shift=[5 0] of_panel=x",
+        "Bars at=[] start=[] end=[] breadth=[] colour=#E69F00 edge=#E69F00",
+        "Words text=none x=1 y=2 colour=#777777 size=9 shift=[5 0] of_panel=x",
+        "Bars at=[3] start=[0.00138889] end=[1.16806] breadth=[0.68] colour=#009E73 edge=#009E73",
+        "Words text=1 · 70 min x=1 y=3 size=9 shift=[5 0] of_panel=x",
+    ]
+
+
+def test_a_contact_in_time_has_a_row_for_each_state_and_both_errors():
+    states = [("slew", 0.0, 60.0), ("data", 60.0, 600.0), ("loss", 600.0, 630.0), ("beacon", 630.0, 690.0)]
+    states += [("lock", 690.0, 700.0), ("data", 700.0, 900.0)]
+    windows = Windows(array(90, 300), array(1.5e-6, 2e-6), array(4e-6, 6e-6))
+    assert figure_of(contact_run(states, windows, 2.5e-6)) == [
+        "contact-run",
+        "A contact, simulated",
+        (
+            "States of the terminal, one row each; at the right how often and how long in all. "
+            "Below: radial pointing error in the windows that were simulated in full."
+        ),
+        {
+            "slew, start (s)": [0.0],
+            "data, start (s)": [60.0, 700.0],
+            "loss, start (s)": [600.0],
+            "beacon, start (s)": [630.0],
+            "lock, start (s)": [690.0],
+            "slew, end (s)": [60.0],
+            "data, end (s)": [600.0, 900.0],
+            "loss, end (s)": [630.0],
+            "beacon, end (s)": [690.0],
+            "lock, end (s)": [700.0],
+            "window (s)": [90.0, 300.0],
+            "rms (rad)": [1.5e-06, 2e-06],
+            "largest (rad)": [4e-06, 6e-06],
+        },
+        "Sheet width=7.6 height=4.2 heights=[1.2 1.7] share_x=True legend=<place=below columns=3>",
+        ("Panel 0 0 x=<low=0 high=15> y=<low=4.6 high=-0.6 ticks={0: slew, 1: data, 2: loss, 3: beacon, 4:"),
+        "  lock} grid=False>",
+        "Bars at=[0] start=[0] end=[1] breadth=[0.68] colour=#E69F00 edge=#E69F00",
+        "Words text=1 · 60 s x=1 y=0 size=9 shift=[5 0] of_panel=x",
+        ("Bars at=[1 1] start=[1 11.6667] end=[10 15] breadth=[0.68 0.68] colour=#0072B2 edge=#0072B2"),
+        "Words text=2 · 12.3 min x=1 y=1 size=9 shift=[5 0] of_panel=x",
+        "Bars at=[2] start=[10] end=[10.5] breadth=[0.68] colour=#D55E00 edge=#D55E00",
+        "Words text=1 · 30 s x=1 y=2 size=9 shift=[5 0] of_panel=x",
+        "Bars at=[3] start=[10.5] end=[11.5] breadth=[0.68] colour=#009E73 edge=#009E73",
+        "Words text=1 · 60 s x=1 y=3 size=9 shift=[5 0] of_panel=x",
+        "Bars at=[4] start=[11.5] end=[11.6667] breadth=[0.68] colour=#56B4E9 edge=#56B4E9",
+        "Words text=1 · 10 s x=1 y=4 size=9 shift=[5 0] of_panel=x",
+        ("Panel 1 0 x=<title=time since the start of the contact (min) low=0 high=15> y=<title=radial"),
+        "  error (µrad) low=0>",
+        "Line x=[1.5 5] y=[4 6] colour=#D55E00 dash= label=largest marker=^ size=4.5 clip=False",
+        "Line x=[1.5 5] y=[1.5 2] colour=#0072B2 dash= label=rms marker=o size=4.5 clip=False",
+        "Rule at=2.5 upright=False dash=-- label=required: 2.5 µrad",
+    ]
+
+
+def test_along_a_contact_each_panel_has_its_own_values_and_a_rule_where_they_change_their_sign():
+    found = array(0, 60, 180), array(1e6, 2e6, 1.5e6), array(1e-5, 2e-5, 4e-5), array(1e-4, 3e-4, 2e-4)
+    assert figure_of(along_contact(*found, array(4e9, 1e9, -2e9), number=4, rise_utc="a time")) == [
+        "along-contact",
+        "Along contact 4",
+        (
+            "Range, point-ahead angle, inertial rate of the line of sight and Doppler shift "
+            "over contact 4, which rises at a time UTC."
+        ),
+        {
+            "time since rise (s)": [0.0, 60.0, 180.0],
+            "range (m)": [1000000.0, 2000000.0, 1500000.0],
+            "point-ahead (rad)": [1e-05, 2e-05, 4e-05],
+            "line-of-sight rate (rad/s)": [0.0001, 0.0003, 0.0002],
+            "Doppler (Hz)": [4000000000.0, 1000000000.0, -2000000000.0],
+        },
+        "Sheet width=7.6 height=4.4 heights=[1 1] widths=[1 1] share_x=True",
+        "Panel 0 0 x=<low=0 high=3> y=<title=range (km)>",
+        "Line x=[0 1 3] y=[1000 2000 1500] colour=#0072B2",
+        "Panel 0 1 x=<low=0 high=3> y=<title=point-ahead angle (µrad)>",
+        "Line x=[0 1 3] y=[10 20 40] colour=#0072B2",
+        ("Panel 1 0 x=<title=time since rise (min) low=0 high=3> y=<title=line-of-sight rate (µrad/s)>"),
+        "Line x=[0 1 3] y=[100 300 200] colour=#0072B2",
+        "Panel 1 1 x=<title=time since rise (min) low=0 high=3> y=<title=Doppler shift (GHz)>",
+        "Line x=[0 1 3] y=[4 1 -2] colour=#0072B2",
+        "Rule at=0 upright=False colour=#777777 width=0.8",
+    ]
+
+
+def test_volumes_of_other_sizes_and_spans_have_their_units_colours_and_limits():
+    cumulative = {"made": (array(3600, 7200), array(8e9, 16e9)), "relay": (array(1800, 9000), array(0, 24e9))}
+    stored = {"relay": (array(3600, 9000), array(4e6, 2e6)), "direct": (array(3600, 5400), array(0, 8e6))}
+    assert figure_of(data_volume(cumulative, stored)) == [
+        "data-volume",
+        "Data generated, delivered and stored",
+        (
+            "Above: data generated and delivered since the start. Below: what waits on board "
+            "for its way down. Behind the mission's span nothing more is generated, and what "
+            "waits is still delivered."
+        ),
+        {
+            "made, since the start, time (s)": [3600.0, 7200.0],
+            "made, since the start (bit)": [8000000000.0, 16000000000.0],
+            "relay, since the start, time (s)": [1800.0, 9000.0],
+            "relay, since the start (bit)": [0.0, 24000000000.0],
+            "relay, stored, time (s)": [3600.0, 9000.0],
+            "relay, stored (bit)": [4000000.0, 2000000.0],
+            "direct, stored, time (s)": [3600.0, 5400.0],
+            "direct, stored (bit)": [0.0, 8000000.0],
+        },
+        "Sheet width=7.6 height=4.8 heights=[1.4 1] share_x=True legend=<place=above columns=4>",
+        ("Panel 0 0 x=<low=0.5 high=2.5 ticks=[0.5 0.75 1 1.25 1.5 1.75 2 2.25 2.5]> y=<title=since the"),
+        "  start (GB) low=-0.06>",
+        "Line x=[1 2] y=[1 2] width=1.5 label=made",
+        "Line x=[0.5 2.5] y=[0 3] colour=#0072B2 dash=-- width=1.5 label=relay",
+        "Panel 1 0 x=<title=time (h) low=0.5 high=2.5 ticks=[0.5 0.75 1 1.25 1.5 1.75 2 2.25 2.5]>",
+        "  y=<title=stored on board (MB) low=-0.02>",
+        "Line x=[1 2.5] y=[0.5 0.25] colour=#0072B2 dash=-- width=1.5 label=relay",
+        "Line x=[1 1.5] y=[0 1] colour=#E69F00 dash=-. width=1.5 label=direct",
+    ]
+
+
+def test_latencies_of_three_ways_say_what_each_of_them_reaches():
+    curves = {
+        "relay": (array(10, 20, 40, 80), array(0.25, 0.5, 0.75, 1.0)),
+        "direct": (array(0, 600, 1200), array(0, 0.5, 0.75)),
+        "optical": (array(100, 200), array(0.2, 0.4)),
+    }
+    assert figure_of(latency(curves)) == [
+        "latency",
+        "From recording to delivery",
+        ("Share of the data that has arrived within a time after it was recorded. Circle: median. Diamond: 99 %."),
+        {
+            "relay, latency (s)": [10.0, 20.0, 40.0, 80.0],
+            "relay, share": [0.25, 0.5, 0.75, 1.0],
+            "direct, latency (s)": [0.0, 600.0, 1200.0],
+            "direct, share": [0.0, 0.5, 0.75],
+            "optical, latency (s)": [100.0, 200.0],
+            "optical, share": [0.2, 0.4],
+        },
+        "Sheet width=7.6 height=3.6 legend=<place=above>",
+        ("Panel 0 0 x=<title=time from recording to delivery log=True low=5 high=1440 ticks={5: 5 s, 10:"),
+        "  10 s, 20: 20 s, 30: 30 s, 60: 1 min, 120: 2 min, 300: 5 min, 600: 10 min, 1200: 20 min}>",
+        "  y=<title=share of the data (%) low=0 high=101>",
+        "Rule at=50 upright=False colour=#777777 dash=: width=0.7",
+        "Rule at=99 upright=False colour=#777777 dash=: width=0.7",
+        ("Line x=[10 20 40 80] y=[25 50 75 100] colour=#0072B2 dash=-- width=1.5 label=relay: median 20 s,"),
+        "  99 % 78.4 s",
+        "Line x=[20] y=[50] colour=#0072B2 dash= marker=o clip=False",
+        "Line x=[78.4] y=[99] colour=#0072B2 dash= marker=D clip=False",
+        ("Line x=[0 600 1200] y=[0 50 75] colour=#E69F00 dash=-. width=1.5 label=direct: median 10 min, 75"),
+        "  % arrive",
+        "Line x=[600] y=[50] colour=#E69F00 dash= marker=o clip=False",
+        "Line x=[100 200] y=[20 40] colour=#009E73 dash=: width=1.5 label=optical: 40 % arrive",
+    ]
+
+
+def test_assumptions_without_bound_and_without_value_stand_among_others():
+    swings = [Assumed("rate: 1 / 2", 12.0, 5.0), Assumed("b", math.inf, 7.0), Assumed("c", math.nan, 6.0)]
+    assert figure_of(assumptions(swings, 8.0, "volume (TB)")) == [
+        "assumptions",
+        "What the assumptions decide",
+        "Volume (TB): one assumption at a time at its lower and at its higher value.",
+        {
+            "as assumed": [8.0],
+            "rate: 1 / 2, lower": [12.0],
+            "b, lower": ["inf"],
+            "c, lower": ["nan"],
+            "rate: 1 / 2, higher": [5.0],
+            "b, higher": [7.0],
+            "c, higher": [6.0],
+        },
+        "Sheet width=7.6 height=1.81 legend=<place=above columns=2 only=[<rings=[] colour=#E69F00",
+        "  label=assumption lower> <rings=[] colour=#0072B2 label=assumption higher>]>",
+        ("Panel 0 0 x=<title=volume (TB); as assumed: 8> y=<low=2.6 high=-0.6 ticks={0: rate: 1 / 2, 1: b,"),
+        "  2: c} grid=False size=8>",
+        "Bars at=[0] start=[8] end=[12] breadth=[0.7] colour=#E69F00",
+        "Bars at=[0] start=[8] end=[5] breadth=[0.7] colour=#0072B2",
+        "Words text= x=1 y=0 colour=#777777 shift=[5 0] of_panel=x",
+        "Bars at=[1] start=[8] end=[13.6] breadth=[0.7] colour=#E69F00 opacity=0.5",
+        "Bars at=[1] start=[8] end=[7] breadth=[0.7] colour=#0072B2",
+        "Words text=lower: without bound x=1 y=1 colour=#777777 shift=[5 0] of_panel=x",
+        "Bars at=[2] start=[8] end=[6] breadth=[0.7] colour=#0072B2",
+        "Words text=lower: no value x=1 y=2 colour=#777777 shift=[5 0] of_panel=x",
+        "Rule at=8 upright=True width=0.8",
+    ]
+
+
+def test_a_map_with_two_of_each_has_its_lines_names_and_entries():
+    def place(*degrees):
+        return Places(*np.radians(np.reshape(degrees, (2, -1))))
+
+    track = place(10, 30, 60, 20, 170, 175, -170, -100)
+    contact = {"relay": np.array([True, False, True, True]), "direct": np.array([False] * 4)}
+    ring = place(10, 20, 20, 10, 10, -20, -20, 0, 0, -20)
+    moving, still = Marked(place(1, 2, 3, 4), NO_PLACES), Marked(place(0, 130), NO_PLACES)
+    stations = {"s": Marked(place(15, -10), ring), "t": Marked(place(-50, 60), NO_PLACES)}
+    figure = world_map(track, contact, {"M": moving, "G": still}, stations, 7200.0)
+    del figure.sheet.panels[0].marks[0]  # the coasts
+    assert figure_of(figure) == [
+        "world-map",
+        "Ground track, relays and stations",
+        (
+            "Ground track of the satellite in the first 2 h of the span, thick where it is in "
+            "contact. The relay moves: marked where it is at the start, with its own ground "
+            "track as a thin line. Inside a station's circle the satellite is above the lowest "
+            "elevation of that station. Land: Natural Earth."
+        ),
+        {
+            "track, latitude (deg)": [10.0, 30.0, 60.0, 20.0],
+            "track, longitude (deg)": [170.0, 175.0, -170.0, -100.0],
+            "in contact: relay": [1.0, 0.0, 1.0, 1.0],
+            "in contact: direct": [0.0, 0.0, 0.0, 0.0],
+            "M, latitude (deg)": [1.0, 2.0],
+            "M, longitude (deg)": [3.0, 4.0],
+            "M, outline, latitude (deg)": [],
+            "M, outline, longitude (deg)": [],
+            "G, latitude (deg)": [0.0],
+            "G, longitude (deg)": [130.0],
+            "G, outline, latitude (deg)": [],
+            "G, outline, longitude (deg)": [],
+            "s, latitude (deg)": [15.0],
+            "s, longitude (deg)": [-10.0],
+            "s, outline, latitude (deg)": [10.0, 20.0, 20.0, 10.0, 10.0],
+            "s, outline, longitude (deg)": [-20.0, -20.0, 0.0, 0.0, -20.0],
+            "t, latitude (deg)": [-50.0],
+            "t, longitude (deg)": [60.0],
+            "t, outline, latitude (deg)": [],
+            "t, outline, longitude (deg)": [],
+        },
+        ("Sheet width=7.6 height=4.6 legend=<place=below columns=3 only=[<x=[170 nan -170 -100] y=[10 30"),
+        "  60 20] colour=#56B4E9 width=3.4 label=relay> <x=[nan nan nan nan] y=[10 30 60 20]",
+        ("  colour=#E69F00 width=2.4 label=direct: none> <x=[170 175 180 nan -180 -170 -100] y=[10 30 40"),
+        ("  nan 40 60 20] width=0.5 label=ground track> <x=[170] y=[10] dash= label=start marker=o size=4>"),
+        "  <x=[] y=[] colour=#0072B2 width=0.7 label=relay at the start, its track marker=D size=7",
+        "  edge=#ffffff> <x=[] y=[] colour=#0072B2 dash= width=1 label=relay marker=D size=7",
+        ("  edge=#ffffff> <x=[] y=[] colour=#D55E00 width=1 label=station, its horizon marker=^ size=7"),
+        "  edge=#ffffff> <x=[] y=[] colour=#D55E00 dash= width=1 label=station marker=^ size=7",
+        "  edge=#ffffff>]>",
+        ("Panel 0 0 x=<low=-180 high=180 ticks={-180: 180°, -120: 120° W, -60: 60° W, 0: 0°, 60: 60° E,"),
+        ("  120: 120° E, 180: 180°}> y=<low=-90 high=90 ticks={-90: 90° S, -60: 60° S, -30: 30° S, 0: 0°,"),
+        "  30: 30° N, 60: 60° N, 90: 90° N}> framed=True equal=True",
+        "Line x=[170 nan -170 -100] y=[10 30 60 20] colour=#56B4E9 width=3.4 label=relay",
+        "Line x=[nan nan nan nan] y=[10 30 60 20] colour=#E69F00 width=2.4 label=direct: none",
+        ("Line x=[170 175 180 nan -180 -170 -100] y=[10 30 40 nan 40 60 20] width=0.5 label=ground track"),
+        "Line x=[170] y=[10] dash= label=start marker=o size=4",
+        "Line x=[] y=[] colour=#0072B2 dash=-- width=1",
+        "Line x=[3 4] y=[1 2] colour=#0072B2 width=0.7",
+        "Line x=[3] y=[1] colour=#0072B2 dash= marker=D size=7 edge=#ffffff clip=False",
+        "Words text=M x=3 y=1 shift=[6 0] box=True",
+        "Line x=[] y=[] colour=#0072B2 dash=-- width=1",
+        "Line x=[130] y=[0] colour=#0072B2 width=0.7",
+        "Line x=[130] y=[0] colour=#0072B2 dash= marker=D size=7 edge=#ffffff clip=False",
+        "Words text=G x=130 y=0 anchor=end shift=[-6 0] box=True",
+        "Line x=[-20 -20 0 0 -20] y=[10 20 20 10 10] colour=#D55E00 width=1",
+        "Line x=[-10] y=[15] colour=#D55E00 width=0.7",
+        "Line x=[-10] y=[15] colour=#D55E00 dash= marker=^ size=7 edge=#ffffff clip=False",
+        "Words text=s x=-10 y=15 shift=[6 0] box=True",
+        "Line x=[] y=[] colour=#D55E00 width=1",
+        "Line x=[60] y=[-50] colour=#D55E00 width=0.7",
+        "Line x=[60] y=[-50] colour=#D55E00 dash= marker=^ size=7 edge=#ffffff clip=False",
+        "Words text=t x=60 y=-50 shift=[6 0] box=True",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ((170, 0, -170, 10), ([170, 180, math.nan, -180, -170], [0, 5, math.nan, 5, 10])),
+        ((-175, -20, 170, 10), ([-175, -180, math.nan, 180, 170], [-20, -10, math.nan, -10, 10])),
+        ((10, 80, -170, 85), ([10, 10, math.nan, -170, -170], [80, 90, math.nan, 90, 85])),
+        ((100, -85, -70, -80), ([100, 100, math.nan, -70, -70], [-85, -90, math.nan, -90, -80])),
+    ],
+)
+def test_a_track_is_broken_at_either_edge_and_over_either_pole(points, said):
+    x, y = broken(array(points[0], points[2]), array(points[1], points[3]))
+    np.testing.assert_allclose((x, y), said, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("value", "below"), [(1.0, 1.0), (1.99, 1.0), (2.0, 2.0), (4.99, 2.0), (5.0, 5.0), (0.07, 0.05), (720.0, 500.0)]
+)
+def test_an_axis_begins_at_1_2_or_5_times_a_power_of_ten(value, below):
+    assert figures._round_below(value) == pytest.approx(below, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("end_s", "hours"),
+    [(4320.0, 0.1), (10800.0, 0.25), (43200.0, 1.0), (46800.0, 2.0), (2073600.0, 48.0), (8640000.0, 240.0)],
+)
+def test_hours_of_a_span_are_a_round_step_apart_from_a_begin_that_is_none(end_s, hours):
+    found = figures._hours(180.0, 180.0 + end_s)
+    assert np.diff(found) == pytest.approx(hours)
+    assert 0.05 <= found[0] <= 0.05 + hours and found[-1] > 0.05 + end_s / 3600.0 - hours
