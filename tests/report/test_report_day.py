@@ -13,16 +13,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import report
+from drawn import plain
+from microrad import orbit, report
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
-from microrad.orbit.day.assumptions import Numbers
+from microrad.orbit.day.assumptions import Numbers, Swing
 from microrad.orbit.operations import OperationsError
+from microrad.report.day import contact_run as contact_report
+from microrad.report.day import data as day_data_file
 from microrad.report.day import tables
 from microrad.report.day import words as day_words
+from microrad.report.day.constellation import plan_data, plan_sentences, plan_text
 from microrad.report.day.contact_run import contact_sentences, windows_table
 from microrad.report.day.figures import day_figures
 from microrad.report.quantities import duration, volume
@@ -782,3 +786,863 @@ def test_what_becomes_of_the_data_is_said_by_each_way_that_there_is():
     assert day_words.latency_words(a_day(direct=a_way())) == [f"{made}{direct}."]
     assert day_words.latency_words(a_day(optical=a_way())) == [f"{made}{optical}."]
     assert day_words.latency_words(a_day(direct=a_way(), optical=a_way())) == [f"{made}{direct}{optical}."]
+
+
+# ------------------------------------------------------------------------------------- tables and data as a whole
+def clock(time_s):
+    """A made epoch's time of day."""
+    return f"2026-03-20T{int(time_s // 3600):02d}:{int(time_s % 3600 // 60):02d}:{time_s % 60:02.0f}.250Z"
+
+
+def rich_way(name, k, contacts=(), stations=()):
+    """A way whose numbers are all unlike each other, and those of other ways."""
+    return SimpleNamespace(
+        name=name,
+        contacts=contacts,
+        stations=stations,
+        contact_s=6000.0 + 1000.0 * k,
+        gap_s=7000.0 + 900.0 * k,
+        carried_bit=np.array([8e9, 16e9]) * (k + 1.0),
+        capacity_bit=24e9 * (k + 1.0),
+        capacity_spread_bit=(12e9 + k * 8e9, 40e9 + k * 8e9),
+        generated_bit=2.4e12,
+        arrived_bit=2e11 + k * 8e9,
+        lost_bit=8e10 + k * 8e9,
+        on_board_bit=4e10 + k * 8e9,
+        failed_contacts=0.125 * (k + 1.0),
+        median_s=30.0 + k,
+        slow_s=400.0 + 100.0 * k,
+        history=SimpleNamespace(largest_stored_bit=1.6e11 + k * 8e9),
+    )
+
+
+def a_pass(start_s, end_s, highest_deg):
+    """A pass over a station that its mask ends."""
+    return orbit.Pass(start_s, end_s, "elevation mask of s", "the Earth", math.radians(highest_deg), start_s + 7.0)
+
+
+def rich_day(**changes):
+    """A day of three ways, two contacts each, whose order is not that of the ways."""
+    contacts = [SimpleNamespace(start_s=s, end_s=e, duration_s=e - s, begins=b, ends="Earth") for s, e, b in TIMES]
+    encounters = [
+        SimpleNamespace(
+            contact=c,
+            range_least_m=1e6 * (k + 2),
+            range_most_m=1.5e6 * (k + 2),
+            point_ahead_most_rad=3e-5 * (k + 1),
+            rate_most_rad_s=7e-4 * (k + 1),
+            acceleration_most_rad_s2=9e-6 * (k + 1),
+            range_rate_most_m_s=5e3 * (k + 1),
+            doppler_most_hz=4e9 * (k + 1),
+        )
+        for k, c in enumerate(contacts)
+    ]
+    here = Numbers(4e12, 2e12, 200.0, 900.0, 1e12, 3000.0)
+    swings = (
+        Swing("rate", "1 Mbit/s", "as it is", Numbers(2e12, 3e12, 250.0, 950.0, 0.5e12, 3600.0), here, here),
+        Swing("store", "1 GB", "9 GB", Numbers(8e12, 0.0, 210.0, 910.0, 2e12, 8000.0), here, here),
+    )
+    given = {
+        "view": SimpleNamespace(
+            pair=SimpleNamespace(
+                epoch=SimpleNamespace(utc=clock, text="an epoch"), geo=SimpleNamespace(name="HUB"), span_s=(0.0, 8e4)
+            ),
+            partner="relay",
+            duration_s=80000.0,
+            visible_share=0.375,
+            median_s=777.0,
+            closed_form=SimpleNamespace(duration_s=888.0),
+        ),
+        "encounters": encounters,
+        "relay": rich_way("relay", 0, contacts),
+        "direct": rich_way(
+            "direct downlink", 1, (a_pass(500.0, 920.0, 41.0), a_pass(7300.0, 7390.0, 12.3)), ("a", "b")
+        ),
+        "optical": rich_way(
+            "optical downlink", 2, (a_pass(2000.0, 2300.0, 80.0), a_pass(9000.0, 9030.0, 33.0)), ("=c", "a")
+        ),
+        "sky": SimpleNamespace(
+            names=("=c", "a"),
+            availability=(0.3, 0.6),
+            drawn=(0.25, 0.65),
+            any_clear=0.68,
+            any_drawn=0.7,
+            any_independent=0.72,
+            correlation=np.array([[1.0, 0.125], [0.125, 1.0]]),
+        ),
+        "loss": SimpleNamespace(loss_db=1.25, source="a source", outage=0.003),
+        "closings": [SimpleNamespace(rate_bit_s=622.08e6, margin_db=3.5, largest_range_m=4.5e7)],
+        "swings": swings,
+        "warnings": ("one", "two"),
+    }
+    found = SimpleNamespace(**given | changes)
+    found.ways = [way for way in (found.relay, found.direct, found.optical) if way is not None]
+    return found
+
+
+TIMES = [(600.0, 1350.0, "elevation mask of g"), (7200.0, 8000.0, "Earth")]
+
+
+def told_table(table):
+    """All of a table but its title's place."""
+    rows = [[str(cell) for cell in row] for row in table.rows]
+    return [table.title, table.folded, list(table.headings), rows, list(table.words), plain(dict(table.names))]
+
+
+def test_contacts_of_three_ways_stand_in_their_order_with_each_ones_own_numbers():
+    table = tables.contacts_table(rich_day())
+    assert [*told_table(table), list(table.brief)] == [
+        "Contacts",
+        "Every contact",
+        [
+            "by",
+            "rise (UTC)",
+            "set",
+            "min",
+            "range\n(km)",
+            "point-ahead\n(µrad)",
+            "rate\n(µrad/s)",
+            "Doppler\n(GHz)",
+            "highest\n(deg)",
+            "could\ncarry",
+            "begins and ends by",
+        ],
+        [
+            ["a", "2026-03-20 00:08:20", "00:15:20", "7.00", "", "", "", "", "41.0", "2 GB", "mask to the Earth"],
+            [
+                "HUB",
+                "2026-03-20 00:10:00",
+                "00:22:30",
+                "12.50",
+                "2000 to 3000",
+                "30.0",
+                "700",
+                "4.00",
+                "",
+                "1 GB",
+                "mask to Earth",
+            ],
+            [
+                "=c, optical",
+                "2026-03-20 00:33:20",
+                "00:38:20",
+                "5.00",
+                "",
+                "",
+                "",
+                "",
+                "80.0",
+                "3 GB",
+                "mask to the Earth",
+            ],
+            [
+                "HUB",
+                "2026-03-20 02:00:00",
+                "02:13:20",
+                "13.33",
+                "3000 to 4500",
+                "60.0",
+                "1400",
+                "8.00",
+                "",
+                "2 GB",
+                "Earth",
+            ],
+            ["b", "2026-03-20 02:01:40", "02:03:10", "1.50", "", "", "", "", "12.3", "4 GB", "mask to the Earth"],
+            [
+                "a, optical",
+                "2026-03-20 02:30:00",
+                "02:30:30",
+                "0.50",
+                "",
+                "",
+                "",
+                "",
+                "33.0",
+                "6 GB",
+                "mask to the Earth",
+            ],
+        ],
+        [0, 10],
+        {
+            1: "day.contacts.start_s",
+            2: "day.contacts.end_s",
+            3: "day.contacts.duration_s",
+            4: "day.contacts.range_most_m",
+            5: "day.contacts.point_ahead_most_rad",
+            6: "day.contacts.line_of_sight_rate_most_rad_s",
+            7: "day.contacts.doppler_most_hz",
+            8: "day.contacts.highest_elevation_rad",
+            9: "day.contacts.could_carry_bit",
+        },
+        [0, 1, 2, 3, 9, 10],
+    ]
+
+
+def test_three_ways_side_by_side_have_each_line_of_numbers_under_its_own_name():
+    assert told_table(tables.ways_table(rich_day())) == [
+        "Relay and downlinks",
+        (
+            "What the ways could carry: 3 GB by relay and 6 GB by direct downlink and 9 GB by "
+            "optical downlink; line by line"
+        ),
+        ["", "relay", "direct downlink", "optical downlink"],
+        [
+            ["contacts", "2", "2", "2"],
+            ["time in contact", "100 min", "117 min", "133 min"],
+            ["longest time without contact", "117 min", "2.19 h", "2.44 h"],
+            ["could carry", "3 GB", "6 GB", "9 GB"],
+            ["contacts without acquisition", "0.125", "", ""],
+            ["made by the instrument", "300 GB", "300 GB", "300 GB"],
+            ["lost for want of room", "10 GB", "11 GB", "12 GB"],
+            ["on board at most", "20 GB", "21 GB", "22 GB"],
+            ["on board at the end of what is followed", "5 GB", "6 GB", "7 GB"],
+            ["arrive", "25 GB", "26 GB", "27 GB"],
+            ["latency of what is kept, median", "30 s", "31 s", "32 s"],
+            ["latency of what is kept, 99 %", "6.67 min", "8.33 min", "10 min"],
+        ],
+        [0],
+        {
+            1: [
+                "day.relay.contacts",
+                "day.relay.contact_s",
+                "day.relay.longest_gap_s",
+                "day.relay.could_carry_bit",
+                "day.relay.contacts_without_acquisition",
+                "day.relay.generated_bit",
+                "day.relay.lost_bit",
+                "",
+                "day.relay.on_board_at_end_bit",
+                "day.relay.arrived_bit",
+                "day.relay.latency_median_s",
+                "day.relay.latency_99_percent_s",
+            ],
+            2: [
+                "day.direct.contacts",
+                "day.direct.contact_s",
+                "day.direct.longest_gap_s",
+                "day.direct.could_carry_bit",
+                "day.direct.contacts_without_acquisition",
+                "day.direct.generated_bit",
+                "day.direct.lost_bit",
+                "",
+                "day.direct.on_board_at_end_bit",
+                "day.direct.arrived_bit",
+                "day.direct.latency_median_s",
+                "day.direct.latency_99_percent_s",
+            ],
+            3: [
+                "day.optical.contacts",
+                "day.optical.contact_s",
+                "day.optical.longest_gap_s",
+                "day.optical.could_carry_bit",
+                "day.optical.contacts_without_acquisition",
+                "day.optical.generated_bit",
+                "day.optical.lost_bit",
+                "",
+                "day.optical.on_board_at_end_bit",
+                "day.optical.arrived_bit",
+                "day.optical.latency_median_s",
+                "day.optical.latency_99_percent_s",
+            ],
+        },
+    ]
+
+
+def test_two_ways_of_which_one_is_optical_have_its_names():
+    assert told_table(tables.ways_table(rich_day(direct=None)))[-1] == {
+        1: [
+            "day.relay.contacts",
+            "day.relay.contact_s",
+            "day.relay.longest_gap_s",
+            "day.relay.could_carry_bit",
+            "day.relay.contacts_without_acquisition",
+            "day.relay.generated_bit",
+            "day.relay.lost_bit",
+            "",
+            "day.relay.on_board_at_end_bit",
+            "day.relay.arrived_bit",
+            "day.relay.latency_median_s",
+            "day.relay.latency_99_percent_s",
+        ],
+        2: [
+            "day.optical.contacts",
+            "day.optical.contact_s",
+            "day.optical.longest_gap_s",
+            "day.optical.could_carry_bit",
+            "day.optical.contacts_without_acquisition",
+            "day.optical.generated_bit",
+            "day.optical.lost_bit",
+            "",
+            "day.optical.on_board_at_end_bit",
+            "day.optical.arrived_bit",
+            "day.optical.latency_median_s",
+            "day.optical.latency_99_percent_s",
+        ],
+    }
+
+
+def test_the_sky_has_each_station_beside_its_own_share_and_any_of_them_below():
+    assert told_table(tables.sky_table(rich_day())) == [
+        "Clear sky over the stations",
+        "Share of the time without clouds",
+        ["optical station", "clear", "in the runs"],
+        [
+            ["=c", "30.0 %", "25.0 %"],
+            ["a", "60.0 %", "65.0 %"],
+            ["any of them", "68.0 %", "70.0 %"],
+            ["any of them, were clouds independent", "72.0 %", ""],
+        ],
+        [0],
+        {
+            1: [
+                "day.sky.sites.=c.availability",
+                "day.sky.sites.a.availability",
+                "day.sky.any_clear",
+                "day.sky.any_clear_independent",
+            ],
+            2: ["day.sky.sites.=c.drawn", "day.sky.sites.a.drawn", "day.sky.any_clear_drawn", ""],
+        },
+    ]
+
+
+@pytest.mark.parametrize("missing", ["direct", "optical"])
+def test_assumptions_of_two_ways_have_no_numbers_of_the_third(missing):
+    _, _, headings, rows, _, names = told_table(tables.assumptions_table(rich_day(**{missing: None})))
+    assert [len(row) for row in rows] == [len(headings)] * 3
+    assert ("125 GB" in str(rows)) is (missing == "direct") and ("ratio" in headings)
+    assert [row[3:5] for row in rows] == (
+        [["", ""]] * 3 if missing == "direct" else [["375 GB", "0.667"], ["0 B", ""], ["250 GB", "2"]]
+    )
+    assert (max(names) == len(headings) - 1) and all(name.count(".") == 1 for name in names.values() if name)
+
+
+def test_assumptions_of_three_ways_have_a_row_for_each_side_that_is_changed():
+    assert told_table(tables.assumptions_table(rich_day())) == [
+        "One assumption changed",
+        "One assumption changed, all others as they are",
+        [
+            "assumption",
+            "changed to",
+            "relay",
+            "direct",
+            "ratio",
+            "99 % by\nrelay",
+            "99 %\ndirect",
+            "optical",
+            "99 %\noptical",
+        ],
+        [
+            ["rate", "1 Mbit/s", "250 GB", "375 GB", "0.667", "4.17 min", "15.8 min", "62.5 GB", "60 min"],
+            ["store", "1 GB", "1 TB", "0 B", "", "3.5 min", "15.2 min", "250 GB", "2.22 h"],
+            ["store", "9 GB", "500 GB", "250 GB", "2", "3.33 min", "15 min", "125 GB", "50 min"],
+        ],
+        [0, 1],
+        {
+            2: "day.relay_could_carry_bit",
+            3: "day.direct_could_carry_bit",
+            4: "",
+            5: "day.relay_latency_99_percent_s",
+            6: "day.direct_latency_99_percent_s",
+            7: "day.optical_could_carry_bit",
+            8: "day.optical_latency_99_percent_s",
+        },
+    ]
+
+
+def test_the_data_of_a_day_have_every_number_of_three_ways_under_its_own_name(monkeypatch):
+    monkeypatch.setattr(day_data_file.words, "sentences", lambda day: ["said"])
+    assert plain(day_data_file.day_data(rich_day())) == {
+        "epoch": "an epoch",
+        "duration_s": 80000.0,
+        "contacts": [
+            {
+                "start_utc": "2026-03-20T00:10:00.250Z",
+                "end_utc": "2026-03-20T00:22:30.250Z",
+                "start_s": 600.0,
+                "end_s": 1350.0,
+                "duration_s": 750.0,
+                "begins": "elevation mask of g",
+                "ends": "Earth",
+                "range_least_m": 2000000.0,
+                "range_most_m": 3000000.0,
+                "point_ahead_most_rad": 3e-05,
+                "line_of_sight_rate_most_rad_s": 0.0007,
+                "line_of_sight_acceleration_most_rad_s2": 9e-06,
+                "range_rate_most_m_s": 5000.0,
+                "doppler_most_hz": 4000000000.0,
+                "could_carry_bit": 8000000000.0,
+            },
+            {
+                "start_utc": "2026-03-20T02:00:00.250Z",
+                "end_utc": "2026-03-20T02:13:20.250Z",
+                "start_s": 7200.0,
+                "end_s": 8000.0,
+                "duration_s": 800.0,
+                "begins": "Earth",
+                "ends": "Earth",
+                "range_least_m": 3000000.0,
+                "range_most_m": 4500000.0,
+                "point_ahead_most_rad": 6e-05,
+                "line_of_sight_rate_most_rad_s": 0.0014,
+                "line_of_sight_acceleration_most_rad_s2": 1.8e-05,
+                "range_rate_most_m_s": 10000.0,
+                "doppler_most_hz": 8000000000.0,
+                "could_carry_bit": 16000000000.0,
+            },
+        ],
+        "visible_share": 0.375,
+        "median_contact_s": 777.0,
+        "closed_form_contact_s": 888.0,
+        "pointing_loss_db": 1.25,
+        "pointing_loss_source": "a source",
+        "outage": 0.003,
+        "rates": [{"rate_bit_s": 622080000.0, "margin_db": 3.5, "largest_range_m": 45000000.0}],
+        "relay": {
+            "contacts": 2,
+            "contact_s": 6000.0,
+            "longest_gap_s": 7000.0,
+            "could_carry_bit": 24000000000.0,
+            "could_carry_least_bit": 12000000000.0,
+            "could_carry_most_bit": 40000000000.0,
+            "generated_bit": 2400000000000.0,
+            "arrived_bit": 200000000000.0,
+            "lost_bit": 80000000000.0,
+            "on_board_at_end_bit": 40000000000.0,
+            "contacts_without_acquisition": 0.125,
+            "latency_median_s": 30.0,
+            "latency_99_percent_s": 400.0,
+        },
+        "direct": {
+            "contacts": 2,
+            "contact_s": 7000.0,
+            "longest_gap_s": 7900.0,
+            "could_carry_bit": 48000000000.0,
+            "could_carry_least_bit": 20000000000.0,
+            "could_carry_most_bit": 48000000000.0,
+            "generated_bit": 2400000000000.0,
+            "arrived_bit": 208000000000.0,
+            "lost_bit": 88000000000.0,
+            "on_board_at_end_bit": 48000000000.0,
+            "contacts_without_acquisition": 0.25,
+            "latency_median_s": 31.0,
+            "latency_99_percent_s": 500.0,
+            "passes": [
+                {
+                    "start_utc": "2026-03-20T00:08:20.250Z",
+                    "end_utc": "2026-03-20T00:15:20.250Z",
+                    "start_s": 500.0,
+                    "end_s": 920.0,
+                    "duration_s": 420.0,
+                    "begins": "elevation mask of s",
+                    "ends": "the Earth",
+                    "station": "a",
+                    "highest_elevation_rad": 0.715585,
+                    "could_carry_bit": 16000000000.0,
+                },
+                {
+                    "start_utc": "2026-03-20T02:01:40.250Z",
+                    "end_utc": "2026-03-20T02:03:10.250Z",
+                    "start_s": 7300.0,
+                    "end_s": 7390.0,
+                    "duration_s": 90.0,
+                    "begins": "elevation mask of s",
+                    "ends": "the Earth",
+                    "station": "b",
+                    "highest_elevation_rad": 0.214675,
+                    "could_carry_bit": 32000000000.0,
+                },
+            ],
+        },
+        "optical": {
+            "contacts": 2,
+            "contact_s": 8000.0,
+            "longest_gap_s": 8800.0,
+            "could_carry_bit": 72000000000.0,
+            "could_carry_least_bit": 28000000000.0,
+            "could_carry_most_bit": 56000000000.0,
+            "generated_bit": 2400000000000.0,
+            "arrived_bit": 216000000000.0,
+            "lost_bit": 96000000000.0,
+            "on_board_at_end_bit": 56000000000.0,
+            "contacts_without_acquisition": 0.375,
+            "latency_median_s": 32.0,
+            "latency_99_percent_s": 600.0,
+            "passes": [
+                {
+                    "start_utc": "2026-03-20T00:33:20.250Z",
+                    "end_utc": "2026-03-20T00:38:20.250Z",
+                    "start_s": 2000.0,
+                    "end_s": 2300.0,
+                    "duration_s": 300.0,
+                    "begins": "elevation mask of s",
+                    "ends": "the Earth",
+                    "station": "=c",
+                    "highest_elevation_rad": 1.39626,
+                    "could_carry_bit": 24000000000.0,
+                },
+                {
+                    "start_utc": "2026-03-20T02:30:00.250Z",
+                    "end_utc": "2026-03-20T02:30:30.250Z",
+                    "start_s": 9000.0,
+                    "end_s": 9030.0,
+                    "duration_s": 30.0,
+                    "begins": "elevation mask of s",
+                    "ends": "the Earth",
+                    "station": "a",
+                    "highest_elevation_rad": 0.575959,
+                    "could_carry_bit": 48000000000.0,
+                },
+            ],
+        },
+        "sky": {
+            "sites": [
+                {"name": "=c", "availability": 0.3, "drawn": 0.25},
+                {"name": "a", "availability": 0.6, "drawn": 0.65},
+            ],
+            "any_clear": 0.68,
+            "any_clear_drawn": 0.7,
+            "any_clear_independent": 0.72,
+            "correlation": [[1.0, 0.125], [0.125, 1.0]],
+        },
+        "assumptions": [
+            {
+                "name": "rate",
+                "factor": 3.0,
+                "low": {
+                    "value": "1 Mbit/s",
+                    "relay_could_carry_bit": 2000000000000.0,
+                    "direct_could_carry_bit": 3000000000000.0,
+                    "relay_latency_99_percent_s": 250.0,
+                    "direct_latency_99_percent_s": 950.0,
+                    "optical_could_carry_bit": 500000000000.0,
+                    "optical_latency_99_percent_s": 3600.0,
+                },
+                "high": {
+                    "value": "as it is",
+                    "relay_could_carry_bit": 4000000000000.0,
+                    "direct_could_carry_bit": 2000000000000.0,
+                    "relay_latency_99_percent_s": 200.0,
+                    "direct_latency_99_percent_s": 900.0,
+                    "optical_could_carry_bit": 1000000000000.0,
+                    "optical_latency_99_percent_s": 3000.0,
+                },
+            },
+            {
+                "name": "store",
+                "factor": "inf",
+                "low": {
+                    "value": "1 GB",
+                    "relay_could_carry_bit": 8000000000000.0,
+                    "direct_could_carry_bit": 0.0,
+                    "relay_latency_99_percent_s": 210.0,
+                    "direct_latency_99_percent_s": 910.0,
+                    "optical_could_carry_bit": 2000000000000.0,
+                    "optical_latency_99_percent_s": 8000.0,
+                },
+                "high": {
+                    "value": "9 GB",
+                    "relay_could_carry_bit": 4000000000000.0,
+                    "direct_could_carry_bit": 2000000000000.0,
+                    "relay_latency_99_percent_s": 200.0,
+                    "direct_latency_99_percent_s": 900.0,
+                    "optical_could_carry_bit": 1000000000000.0,
+                    "optical_latency_99_percent_s": 3000.0,
+                },
+            },
+        ],
+        "warnings": ["one", "two"],
+        "verdict": ["said"],
+    }
+
+
+def test_the_lines_of_a_days_file_are_of_each_way_in_the_order_of_their_rise(monkeypatch):
+    monkeypatch.setattr(day_data_file.words, "sentences", lambda day: [])
+    assert day_data_file.day_csv(rich_day()).split("\n") == [
+        (
+            "by,with,rise (UTC),set (UTC),rise (s),set (s),duration (s),begins by,ends "
+            "by,smallest range (m),largest range (m),largest point-ahead (rad),largest rate of "
+            "the line of sight (rad/s),largest acceleration of the line of sight "
+            "(rad/s^2),largest range rate (m/s),largest Doppler shift (Hz),largest elevation "
+            "(rad),could carry (bit)"
+        ),
+        (
+            "direct "
+            "downlink,a,2026-03-20T00:08:20.250Z,2026-03-20T00:15:20.250Z,500.0,920.0,420.0,ele"
+            "vation mask of s,the Earth,,,,,,,,0.7155849933176751,16000000000.0"
+        ),
+        (
+            "relay,HUB,2026-03-20T00:10:00.250Z,2026-03-20T00:22:30.250Z,600.0,1350.0,750.0,ele"
+            "vation mask of "
+            "g,Earth,2000000.0,3000000.0,3e-05,0.0007,9e-06,5000.0,4000000000.0,,8000000000.0"
+        ),
+        (
+            "optical "
+            "downlink,'=c,2026-03-20T00:33:20.250Z,2026-03-20T00:38:20.250Z,2000.0,2300.0,300.0"
+            ",elevation mask of s,the Earth,,,,,,,,1.3962634015954636,24000000000.0"
+        ),
+        (
+            "relay,HUB,2026-03-20T02:00:00.250Z,2026-03-20T02:13:20.250Z,7200.0,8000.0,800.0,Ea"
+            "rth,Earth,3000000.0,4500000.0,6e-05,0.0014,1.8e-05,10000.0,8000000000.0,,160000000"
+            "00.0"
+        ),
+        (
+            "direct "
+            "downlink,b,2026-03-20T02:01:40.250Z,2026-03-20T02:03:10.250Z,7300.0,7390.0,90.0,el"
+            "evation mask of s,the Earth,,,,,,,,0.21467549799530256,32000000000.0"
+        ),
+        (
+            "optical "
+            "downlink,a,2026-03-20T02:30:00.250Z,2026-03-20T02:30:30.250Z,9000.0,9030.0,30.0,el"
+            "evation mask of s,the Earth,,,,,,,,0.5759586531581288,48000000000.0"
+        ),
+    ]
+
+
+def test_a_contact_in_time_has_each_number_of_its_second_window_and_transition():
+    windows = [
+        SimpleNamespace(
+            start_s=100.0 + 60.0 * k,
+            seconds=0.5 + k,
+            range_m=1.2e6 * (k + 1),
+            point_ahead_rad=2e-5 * (k + 1),
+            rate_rad_s=3e-4 * (k + 1),
+            rms_rad=1.25e-6 * (k + 1),
+            quantile_rad=3.5e-6 * (k + 1),
+            largest_rad=4.75e-6 * (k + 1),
+            lowest_margin_db=2.0 - 3.0 * k,
+            share_below=0.0025 * k,
+        )
+        for k in range(2)
+    ]
+    log = [SimpleNamespace(time_s=40.0 + 30.0 * k, state=f"s{k}", to=f"t{k}", cause=f"c{k}") for k in range(2)]
+    run = SimpleNamespace(
+        windows=windows, log=log, contact=SimpleNamespace(start_s=70.0, end_s=700.0), seconds={"data": 5.0}, losses=2
+    )
+    assert told_table(windows_table(run, 0.995)) == [
+        "",
+        "",
+        [
+            "since rise (min)",
+            "range (km)",
+            "point-ahead (µrad)",
+            "rate (µrad/s)",
+            "rms (µrad)",
+            "99.5 % (µrad)",
+            "largest (µrad)",
+            "lowest margin (dB)",
+            "below 0 dB",
+        ],
+        [
+            ["0.50", "1200", "20.0", "300", "1.25", "3.50", "4.75", "+2.00", "0 %"],
+            ["1.50", "2400", "40.0", "600", "2.50", "7.00", "9.50", "−1.00", "0.25 %"],
+        ],
+        [],
+        {
+            0: "contact.windows.start_s",
+            1: "contact.windows.range_m",
+            2: "contact.windows.point_ahead_rad",
+            3: "contact.windows.rate_rad_s",
+            4: "contact.windows.rms_rad",
+            5: "contact.windows.quantile_rad",
+            6: "contact.windows.largest_rad",
+            7: "contact.windows.lowest_margin_db",
+            8: "contact.windows.share_below_0_db",
+        },
+    ]
+    assert told_table(contact_report.transitions_table(run)) == [
+        "",
+        "Every transition of that contact",
+        ["state", "to", "cause", "time"],
+        [["s0", "t0", "c0", "−30.000 s"], ["s1", "t1", "c1", "0.000 s"]],
+        [0, 1, 2],
+        {},
+    ]
+    assert plain(contact_report.contact_run_data(run)) == {
+        "start_s": 70.0,
+        "end_s": 700.0,
+        "seconds_in_state": {"data": 5.0},
+        "losses": 2,
+        "log": [
+            {"time_s": 40.0, "state": "s0", "to": "t0", "cause": "c0"},
+            {"time_s": 70.0, "state": "s1", "to": "t1", "cause": "c1"},
+        ],
+        "windows": [
+            {
+                "start_s": 100.0,
+                "seconds": 0.5,
+                "range_m": 1200000.0,
+                "point_ahead_rad": 2e-05,
+                "rate_rad_s": 0.0003,
+                "rms_rad": 1.25e-06,
+                "quantile_rad": 3.5e-06,
+                "largest_rad": 4.75e-06,
+                "lowest_margin_db": 2.0,
+                "share_below_0_db": 0.0,
+            },
+            {
+                "start_s": 160.0,
+                "seconds": 1.5,
+                "range_m": 2400000.0,
+                "point_ahead_rad": 4e-05,
+                "rate_rad_s": 0.0006,
+                "rms_rad": 2.5e-06,
+                "quantile_rad": 7e-06,
+                "largest_rad": 9.5e-06,
+                "lowest_margin_db": -1.0,
+                "share_below_0_db": 0.0025,
+            },
+        ],
+    }
+
+
+def rich_plan(**changes):
+    """Two satellites, two relays and two ground stations."""
+
+    def of(k, count):
+        scale = np.arange(1.0, count + 1.0)
+        names = ("sessions", "served_s", "longest_gap_s", "busy_s", "volume_bit")
+        return SimpleNamespace(**{name: scale * (k + 1.0) * (10.0 ** (n + 1)) for n, name in enumerate(names)})
+
+    given = {
+        "satellites": ("n0", "n1"),
+        "relays": ("east", "west"),
+        "stations": ("kiruna", "tromso"),
+        "terminals": 3,
+        "station_terminals": (1, 4),
+        "use": np.array([0.25, 0.5]),
+        "station_use": np.array([0.125, 0.75]),
+        "span_s": (3600.0, 90000.0),
+        "opportunities": SimpleNamespace(start_s=np.array([0.0, 100.0, 900.0]), end_s=np.array([9e3, 9.1e3, 9.9e3])),
+        "by_satellite": of(0, 2),
+        "by_relay": of(1, 2),
+        "by_station": of(2, 2),
+        "planned": range(6),
+        "volume_bit": 8.8e12,
+        "loss": SimpleNamespace(loss_db=0.75, source="a source"),
+        "epoch": SimpleNamespace(text="an epoch"),
+    }
+    return SimpleNamespace(**given | changes)
+
+
+def test_a_plan_with_two_of_everything_has_each_number_where_it_belongs():
+    plan = rich_plan()
+    assert plan_sentences(plan) == [
+        (
+            "2 satellites share 2 relays of 3 terminals each and 2 ground stations of 5 "
+            "terminals in all: in 24 h 3 contacts in reach, 8 h in all, of which 6 sessions "
+            "take 8 h and carry 1.1 TB."
+        ),
+        (
+            "A satellite has data for 100 s to 3.33 min, and waits 33.3 min at most. Terminals "
+            "in use: east 25 %, west 50 %."
+        ),
+        ("In reach is where the link closes at its lowest rate, with a pointing loss of 0.75 dB (a source)."),
+        (
+            "90 of the sessions are with ground stations, above their masks, and are expected "
+            "to carry 112 kB under their availability. Terminals in use: kiruna 12 %, tromso "
+            "75 %."
+        ),
+    ]
+    assert plain(plan_data(plan)) == {
+        "epoch": "an epoch",
+        "duration_s": 86400.0,
+        "contacts": 3,
+        "sessions": 6,
+        "volume_bit": 8800000000000.0,
+        "relays": [{"name": "east", "use": 0.25}, {"name": "west", "use": 0.5}],
+        "stations": [
+            {"name": "kiruna", "use": 0.125, "sessions": 30, "volume_bit": 300000.0},
+            {"name": "tromso", "use": 0.75, "sessions": 60, "volume_bit": 600000.0},
+        ],
+        "satellites": [
+            {"name": "n0", "sessions": 10, "with_data_s": 100.0, "longest_gap_s": 1000.0, "volume_bit": 100000.0},
+            {"name": "n1", "sessions": 20, "with_data_s": 200.0, "longest_gap_s": 2000.0, "volume_bit": 200000.0},
+        ],
+    }
+    assert plan_text(plan, 110).split("\n")[7:] == [
+        (
+            "90 of the sessions are with ground stations, above their masks, and are expected "
+            "to carry 112 kB under their"
+        ),
+        "availability. Terminals in use: kiruna 12 %, tromso 75 %.",
+        "",
+        "What each satellite gets",
+        "",
+        " satellite   sessions   with data   longest time without   volume",
+        " ─────────────────────────────────────────────────────────────────",
+        " n0          10         100 s       16.7 min               12.5 kB",
+        " n1          20         3.33 min    33.3 min               25 kB",
+        "",
+        "What each of them takes",
+        "",
+        " relay or station   terminals   sessions   in use   volume",
+        " ──────────────────────────────────────────────────────────",
+        " east               3           20         25 %     25 kB",
+        " west               3           40         50 %     50 kB",
+        " kiruna             1           30         12 %     37.5 kB",
+        " tromso             4           60         75 %     75 kB",
+    ]
+
+
+def test_a_plan_with_one_of_everything_is_told_in_the_singular():
+    one = rich_plan(satellites=("n0",), relays=("east",), stations=("kiruna",), terminals=1, station_terminals=(1,))
+    one.use, one.station_use = one.use[:1], one.station_use[:1]
+    assert plan_sentences(one) == [
+        (
+            "1 satellite shares 1 relay of one terminal and 1 ground station of one terminal: "
+            "in 24 h 3 contacts in reach, 8 h in all, of which 6 sessions take 8 h and carry "
+            "1.1 TB."
+        ),
+        ("A satellite has data for 100 s to 3.33 min, and waits 33.3 min at most. Terminals in use: east 25 %."),
+        ("In reach is where the link closes at its lowest rate, with a pointing loss of 0.75 dB (a source)."),
+        (
+            "90 of the sessions are with ground stations, above their masks, and are expected "
+            "to carry 112 kB under their availability. Terminals in use: kiruna 12 %."
+        ),
+    ]
+    assert "first 40 of" not in plan_text(one, 110)
+
+
+def test_the_words_of_each_way_and_assumption_are_of_their_own_numbers():
+    day = rich_day()
+    assert day_words.latency_words(day) == [
+        (
+            "What becomes of the 300 GB that the instrument makes: by the relay 25 GB arrive "
+            "(of what is kept half arrives within 30 s, and 99 % within 6.67 min), 10 GB find "
+            "the store full, 5 GB are still on board at the end; by the direct downlink 26 GB "
+            "arrive (of what is kept half arrives within 31 s, and 99 % within 8.33 min), 11 "
+            "GB find the store full, 6 GB are still on board at the end; by the optical "
+            "downlink 27 GB arrive (of what is kept half arrives within 32 s, and 99 % within "
+            "10 min), 12 GB find the store full, 7 GB are still on board at the end."
+        )
+    ]
+    assert day_words.assumption_words(day) == [
+        (
+            "What matters most to the ratio of the two volumes, each assumption changed alone: "
+            "store (1 GB: nothing direct, 9 GB: 2); rate (1 Mbit/s: 0.667, as it is: 2)."
+        ),
+        (
+            "What matters most to the optical downlink's volume: rate (1 Mbit/s: 62.5 GB); "
+            "store (1 GB: 250 GB, 9 GB: 125 GB)."
+        ),
+        (
+            "How late data arrive depends most on store: with 1 GB or 9 GB, 99 % arrive within "
+            "3.5 min or 3.33 min by the relay, within 15.2 min or 15 min directly, within 2.22 "
+            "h or 50 min by the optical downlink."
+        ),
+    ]
+    assert day_words.assumption_words(rich_day(direct=None, optical=None)) == [
+        (
+            "What matters most to the relay's volume, each assumption changed alone: store (1 "
+            "GB: 1 TB, 9 GB: 500 GB); rate (1 Mbit/s: 250 GB, as it is: 500 GB)."
+        ),
+        (
+            "What matters most to the optical downlink's volume: rate (1 Mbit/s: 62.5 GB); "
+            "store (1 GB: 250 GB, 9 GB: 125 GB)."
+        ),
+        (
+            "How late data arrive depends most on store: with 1 GB or 9 GB, 99 % arrive within "
+            "3.5 min or 3.33 min by the relay."
+        ),
+    ]
