@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from drawn import figure_of, plain
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.records import (
     CampaignSummary,
@@ -1552,3 +1553,708 @@ def test_the_region_is_of_the_limit_most_often_missed_and_of_the_cell_most_evenl
     assert split((0.0, 0.0), (0.1, 0.2), (0.9, 0.9)) in (("margin", 1), ("margin", 2), ("residual_quantile", 1))
     assert split((0.0, 0.0), (0.1, 0.4), (1.0, 0.8)) == ("residual_quantile", 1)
     assert split((0.0, 1.0), (1.0, 0.0), (0.0, 0.0)) == (None, None)
+
+
+# ------------------------------------------------------------------------- inputs unlike each other, held as a whole
+def between_ends(value, low=0.5, high=1.25):
+    return Interval(value, value * low, value * high, 0.9)
+
+
+def an_output(name="residual_quantile", unit="rad", scale=1e-6, **changes):
+    """An output over 20 rows in four bins of unlike widths."""
+    found = OutputSummary(
+        name,
+        unit,
+        "what it is",
+        20,
+        between_ends(4.0 * scale),
+        1.5 * scale,
+        1.0 * scale,
+        9.0 * scale,
+        {
+            0.01: between_ends(1.5 * scale),
+            0.5: between_ends(3.0 * scale),
+            0.997: Interval(8.0 * scale, 7.0 * scale, math.nan, 0.9),
+            0.99: between_ends(7.5 * scale),
+        },
+        np.array([1.0, 2.0, 4.0, 8.0, 9.0]) * scale,
+        np.array([2.0, 9.0, 6.0, 3.0]),
+    )
+    return replace(found, **changes)
+
+
+def short_tail(**changes):
+    found = Tail(
+        np.array([1e-6, 2e-6, 3e-6, 4e-6]),
+        np.array([0.5, 0.05, 0.002, 0.0]),
+        np.array([0.4, 0.04, 0.0, 0.0]),
+        np.array([0.6, 0.07, 0.01, 0.004]),
+        {0.1: Interval(1.75e-6, 1.5e-6, 2e-6, 0.9), 1e-3: Interval(3.2e-6, 3e-6, math.nan, 0.9), 1e-6: NO_INTERVAL},
+        0.9,
+        "share of the time of 64 rows",
+        3.2e7,
+        {2.5e-6: Interval(0.01, 0.005, 0.025, 0.9)},
+        {2.5e-6: 4e-8},
+    )
+    return replace(found, **changes)
+
+
+NO_INTERVAL = Interval(math.nan, math.nan, math.nan, 0.9)
+
+
+def a_cell(values=None, *, missed=0.25, rows=21, failed=1, tail=None, scale=1.0):
+    outputs = {"residual_quantile": an_output(scale=scale * 1e-6), "margin": an_output("margin", "dB", scale)}
+    by = {"residual_quantile": between_ends(missed), "margin": between_ends(missed / 5.0)}
+    return CellSummary(values or {}, rows, failed, outputs, between_ends(missed), by, tail)
+
+
+TWO_SIDES = (
+    Limit("residual_quantile", None, 6e-6, "requirement.pointing_error"),
+    Limit("margin", 0.5, 12.0, "requirement.margin"),
+)
+
+
+def a_campaign(cells, **changes):
+    """Two inputs, of which the second is the weightier one for the first output, over two cells of six rows."""
+    rows = {"cell": [0, 0, 0, 1, 1, 1], "row": [0, 1, 2, 0, 1, 2]}
+    rows |= {"mirror.alpha": [0.01, 0.02, 0.03, 0.04, 0.05, 0.06], "jitter.rms": [1e-6, 2e-6, 4e-5, 5e-5, 6e-6, 7e-6]}
+    rows |= {"residual_quantile": [5e-6, 7e-6, math.nan, 1e-6, 6e-6, 8e-6], "margin": [1.0, 0.0, 13.0, 2.0, 3.0, 4.0]}
+    first = {"mirror.alpha": between_ends(0.25), "jitter.rms": between_ends(0.5)}
+    total = {"mirror.alpha": between_ends(0.3), "jitter.rms": Interval(0.625, 0.6, 0.75, 0.9)}
+    rank = {"mirror.alpha": Interval(-0.5, -0.625, -0.375, 0.9), "jitter.rms": between_ends(0.75, 0.5, 1.125)}
+    given = {
+        "name": "a.toml",
+        "mission_name": "m",
+        "hashes": {"campaign": "c", "mission": "d", "code": "e"},
+        "seed": 77,
+        "sampling": "lhs",
+        "loop": "PI, 5 s",
+        "inputs": (InputText("mirror.alpha", "", "normal"), InputText("jitter.rms", "rad", "uniform")),
+        "fixed": {"link.range": "1 km", "b.c": "2"},
+        "limits": TWO_SIDES,
+        "cells": tuple(cells),
+        "sensitivities": (
+            Sensitivity("residual_quantile", 40, first, total, rank, 0.95, "a note"),
+            Sensitivity("margin", 30, {"mirror.alpha": between_ends(0.7, -0.5, 1.5)}, {}, {}, math.nan, ""),
+        ),
+        "sample": {key: np.array(column, dtype=np.float64) for key, column in rows.items()},
+        "worst": (),
+        "failed": ((1, Failed(2, 99, 3, "a reason")), (0, Failed(7, 98, 1, "another"))),
+        "progress": Progress(41, 64, 20.0, 2.05, 300.0, "running"),
+        "warnings": ("a warning",),
+        "findings": ("found",),
+    }
+    return CampaignSummary(**given | changes)
+
+
+def two_cells(**changes):
+    worse = a_cell({"mirror": "b.toml", "aperture": "6 cm"}, missed=0.75, rows=24, failed=0, scale=2.0)
+    better = a_cell({"mirror": "a.toml", "aperture": "5 cm"}, tail=short_tail())
+    return a_campaign([worse, better], **changes)
+
+
+def test_a_distribution_in_unlike_bins_has_its_quantiles_and_both_limits():
+    limit = Limit("residual_quantile", 1.5e-6, 6.5e-6, "a")
+    assert figure_of(drawing.distribution(an_output(), limit)) == [
+        "campaign-residual_quantile",
+        "Distribution of residual_quantile",
+        "What it is: share of the rows in each bin, and quantiles over them.",
+        {
+            "residual_quantile, lower edge (rad)": [1e-06, 2e-06, 4e-06, 8e-06],
+            "residual_quantile, upper edge (rad)": [2e-06, 4e-06, 8e-06, 9e-06],
+            "rows (%)": [10.0, 45.0, 30.0, 15.0],
+        },
+        "Sheet width=7.6 height=2.3 legend=<place=upper right>",
+        "Panel 0 0 x=<title=residual_quantile (µrad)> y=<title=rows (%) low=0>",
+        "Bars at=[1.5 3 6 8.5] start=[0 0 0 0] end=[10 45 30 15] breadth=[1 2 4 1] colour=#56B4E9",
+        "  upright=True",
+        "Line x=[1 1 2 2 4 4 8 8 9 9] y=[0 10 10 45 45 30 30 15 15 0] colour=#0072B2 width=0.8",
+        "Rule at=1.5 upright=True colour=#009E73 dash=-- width=1.1 label=1 %: 1.50 µrad",
+        "Rule at=3 upright=True width=1.1 label=50 %: 3.00 µrad",
+        "Rule at=7.5 upright=True colour=#E69F00 dash=-. width=1.1 label=99 %: 7.50 µrad",
+        "Rule at=1.5 upright=True colour=#D55E00 dash=[5 2] width=1.4 label=limit ≥ 1.5 µrad",
+        "Span low=-inf high=1.5 upright=True colour=#D55E00 opacity=0.1",
+        "Rule at=6.5 upright=True colour=#D55E00 dash=[5 2] width=1.4 label=limit ≤ 6.5 µrad",
+        "Span low=6.5 high=inf upright=True colour=#D55E00 opacity=0.1",
+    ]
+
+
+def test_a_tail_beside_another_has_its_band_radii_and_limit():
+    summary = two_cells()
+    other = replace(summary.cells[0], tail=short_tail(survival=np.array([0.6, 0.0, 0.0, 0.0])))
+    (found,) = drawing.tail(replace(summary, cells=(other, summary.cells[1])), summary.cells[1])
+    assert figure_of(found) == [
+        "campaign-tail",
+        "Tail of the radial error",
+        (
+            "Probability that the radial error of mirror = a.toml, aperture = 5 cm exceeds a "
+            "radius. It comes from the share of the time of 64 rows. It knows 0.1 % as well as "
+            "32 million independent samples of the error would. Shaded: its interval at 90 %."
+        ),
+        {
+            "radius (rad)": [1e-06, 2e-06, 3e-06, 4e-06],
+            "probability": [0.5, 0.05, 0.002, 0.0],
+            "lower end": [0.4, 0.04, 0.0, 0.0],
+            "upper end": [0.6, 0.07, 0.01, 0.004],
+        },
+        "Sheet width=7.6 height=3.8 legend=<place=upper right>",
+        ("Panel 0 0 x=<title=radial error (µrad) low=0> y=<title=probability of a larger one log=True"),
+        "  low=5.01187e-07 high=1>",
+        "Line x=[1] y=[0.6] colour=#777777 width=0.7 label=other combinations",
+        ("Area rings=[[[1 0.4] [2 0.04] [3 1e-300] [3 0.01] [2 0.07] [1 0.6]]] colour=#56B4E9 opacity=0.5"),
+        "Line x=[1 2 3] y=[0.5 0.05 0.002] colour=#0072B2 label=mirror = a.toml, aperture = 5 cm",
+        ("Line x=[1.75] y=[0.1] colour=#D55E00 dash= label=10 %: 1.75 µrad marker=o x_arms=[[0.25] [0.25]]"),
+        ("Line x=[3.2] y=[0.001] colour=#009E73 dash= label=0.1 %: 3.20 µrad marker=s x_arms=[[0.2] [0]]"),
+        "Rule at=6 upright=True colour=#D55E00 dash=[5 2] width=1.4 label=limit ≤ 6 µrad",
+    ]
+
+
+def test_indices_of_two_outputs_stand_in_the_order_of_the_largest_of_either():
+    (figure,) = drawing.sensitivity(two_cells())
+    assert figure_of(figure) == [
+        "campaign-sensitivity-1",
+        "What matters to residual_quantile, margin",
+        (
+            "Sobol indices of mirror = b.toml, aperture = 6 cm from 30 rows: the share of an "
+            "output's variance that an input makes by itself (first order), and with all its "
+            "interactions (total); with intervals. residual_quantile: a note."
+        ),
+        {
+            "residual_quantile, mirror.alpha, first index": [0.25, 0.125, 0.3125],
+            "residual_quantile, jitter.rms, first index": [0.5, 0.25, 0.625],
+            "residual_quantile, mirror.alpha, total index": [0.3, 0.15, 0.375],
+            "residual_quantile, jitter.rms, total index": [0.625, 0.6, 0.75],
+            "margin, mirror.alpha, first index": [0.7, -0.35, 1.05],
+        },
+        "Sheet width=7.6 height=1.92 widths=[1 1] share_y=True legend=<place=above columns=2>",
+        "Panel 0 0 x=<title=index low=0 high=1.05 ticks=[0 0.5 1]> y=<low=1.6 high=-0.6 ticks={0:",
+        "  mirror.alpha, 1: jitter.rms} grid=False size=8> title=residual_quantile",
+        ("Bars at=[-0.19 0.81] start=[0 0] end=[0.25 0.5] breadth=[0.38 0.38] colour=#0072B2 label=first"),
+        "  order",
+        ("Line x=[0.25 0.5] y=[-0.19 0.81] dash= label=first order marker=. size=1 x_arms=[[0.125 0.25]"),
+        "  [0.0625 0.125]]",
+        ("Bars at=[0.19 1.19] start=[0 0] end=[0.3 0.625] breadth=[0.38 0.38] colour=#E69F00 label=total"),
+        ("Line x=[0.3 0.625] y=[0.19 1.19] dash= label=total marker=. size=1 x_arms=[[0.15 0.025] [0.075"),
+        "  0.125]]",
+        "Panel 0 1 x=<title=index low=0 high=1.05 ticks=[0 0.5 1]> y=<low=1.6 high=-0.6 ticks={0:",
+        "  mirror.alpha, 1: jitter.rms} grid=False size=8> title=margin",
+        "Bars at=[0] start=[0] end=[0.7] breadth=[0.76] colour=#0072B2 label=first order",
+        "Line x=[0.7] y=[0] dash= label=first order marker=. size=1 x_arms=[[0.7] [0.35]]",
+    ]
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_region_has_the_rows_of_its_own_combination(number):
+    figure = drawing.region(two_cells(), TWO_SIDES[1], number, ["jitter.rms", "mirror.alpha"], " A note.")
+    assert plain(figure.columns["margin"]) == ([1.0, 0.0, 13.0], [2.0, 3.0, 4.0])[number]
+    assert figure.caption.startswith(f"3 rows of {('mirror = b.toml', 'mirror = a.toml')[number]}")
+    assert figure.caption.endswith(("15 % miss it. A note.", "5 % miss it. A note.")[number])
+
+
+def test_a_region_over_one_input_has_its_output_limits_and_rows_of_three_kinds():
+    figure = drawing.region(two_cells(), TWO_SIDES[0], 0, ["jitter.rms"])
+    assert figure_of(figure) == [
+        "campaign-region",
+        "Where residual_quantile misses its limit",
+        (
+            "3 rows of mirror = b.toml, aperture = 6 cm: those that keep residual_quantile ≤ 6 "
+            "µrad and those that miss it, over jitter.rms, the input that matters most to it. "
+            "Of all rows 75 % miss it."
+        ),
+        {"jitter.rms": [1e-06, 2e-06, 4e-05], "residual_quantile": [5e-06, 7e-06, "nan"]},
+        "Sheet width=7.6 height=4 legend=<place=upper right>",
+        "Panel 0 0 x=<title=jitter.rms (µrad) log=True> y=<title=residual_quantile (µrad)>",
+        "Line x=[1] y=[5] colour=#0072B2 dash= label=kept marker=o size=3",
+        "Line x=[2] y=[7] colour=#D55E00 dash= label=missed marker=x size=4.7",
+        "Rule at=6 upright=False colour=#D55E00 dash=[5 2] width=1.4 label=limit ≤ 6 µrad",
+    ]
+
+
+def test_a_region_over_two_inputs_has_rows_beyond_either_side():
+    figure = drawing.region(two_cells(), TWO_SIDES[1], 0, ["jitter.rms", "mirror.alpha"], " A note.")
+    assert figure_of(figure) == [
+        "campaign-region",
+        "Where margin misses its limit",
+        (
+            "3 rows of mirror = b.toml, aperture = 6 cm: those that keep margin ≥ 0.50 dB and "
+            "≤ 12.00 dB and those that miss it, over jitter.rms and mirror.alpha. Of all rows "
+            "15 % miss it. A note."
+        ),
+        {"jitter.rms": [1e-06, 2e-06, 4e-05], "mirror.alpha": [0.01, 0.02, 0.03], "margin": [1.0, 0.0, 13.0]},
+        "Sheet width=7.6 height=4 legend=<place=upper right>",
+        "Panel 0 0 x=<title=jitter.rms (µrad) log=True> y=<title=mirror.alpha>",
+        "Line x=[1] y=[0.01] colour=#0072B2 dash= label=kept marker=o size=3",
+        "Line x=[2 40] y=[0.02 0.03] colour=#D55E00 dash= label=missed marker=x size=4.7",
+    ]
+
+
+def test_a_grid_in_rows_has_each_combinations_share_and_medians():
+    cells = [replace(cell, values={"mirror": cell.values["mirror"]}) for cell in two_cells().cells]
+    (figure,) = drawing.grid(a_campaign(cells))
+    assert figure_of(figure) == [
+        "campaign-grid",
+        "Over the grid",
+        (
+            "Over mirror: rows that miss a limit, median residual_quantile, median margin; "
+            "bars: intervals of a share, else from the known quantiles nearest to 1 % and 99 "
+            "%, or of all values."
+        ),
+        {
+            "rows that miss a limit, value": [0.75, 0.25],
+            "rows that miss a limit, low": [0.375, 0.125],
+            "rows that miss a limit, high": [0.9375, 0.3125],
+            "median residual_quantile, value": [6e-06, 3e-06],
+            "median residual_quantile, low": [3e-06, 1.5e-06],
+            "median residual_quantile, high": [1.5e-05, 7.5e-06],
+            "median margin, value": [6.0, 3.0],
+            "median margin, low": [3.0, 1.5],
+            "median margin, high": [15.0, 7.5],
+        },
+        ("Sheet width=7.6 height=1.48 widths=[1 1 1] share_y=True heading=mirror heading_at_left=True"),
+        ("Panel 0 0 x=<title=rows that miss a limit (%)> y=<low=1.6 high=-0.6 ticks={0: b.toml, 1: a.toml}"),
+        "  size=8>",
+        ("Line x=[75 25] y=[0 1] colour=#0072B2 dash= marker=o size=4.5 x_arms=[[37.5 12.5] [18.75 6.25]]"),
+        ("Panel 0 1 x=<title=median residual_quantile (µrad)> y=<low=1.6 high=-0.6 ticks={0: b.toml, 1:"),
+        "  a.toml} size=8>",
+        "Line x=[6 3] y=[0 1] colour=#0072B2 dash= marker=o size=4.5 x_arms=[[3 1.5] [9 4.5]]",
+        "Rule at=6 upright=True colour=#D55E00 dash=[5 2] width=1.4",
+        ("Panel 0 2 x=<title=median margin (dB)> y=<low=1.6 high=-0.6 ticks={0: b.toml, 1: a.toml} size=8>"),
+        "Line x=[6 3] y=[0 1] colour=#0072B2 dash= marker=o size=4.5 x_arms=[[3 1.5] [9 4.5]]",
+        "Rule at=0.5 upright=True colour=#D55E00 dash=[5 2] width=1.4",
+        "Rule at=12 upright=True colour=#D55E00 dash=[5 2] width=1.4",
+    ]
+
+
+def test_a_grid_as_maps_has_each_number_in_its_own_field():
+    levels = [("x", "1"), ("x", "2"), ("x", "3"), ("y", "1"), ("y", "2"), ("y", "3")]
+    values = [dict(zip(("one.a", "two.b"), at, strict=True)) for at in levels]
+    cells = [a_cell(at, missed=0.1 * (k + 1), scale=1.0 + k) for k, at in enumerate(values)]
+    cells[4] = replace(cells[4], rows=1)
+    (figure,) = drawing.grid(a_campaign(cells))
+    assert figure_of(figure) == [
+        "campaign-grid",
+        "Over the grid",
+        ("Over one.a and two.b: rows that miss a limit, median residual_quantile; a number in each field."),
+        {
+            "rows that miss a limit, value": [0.1, 0.2, 0.3, 0.4, "nan", 0.6],
+            "rows that miss a limit, low": [0.05, 0.1, 0.15, 0.2, "nan", 0.3],
+            "rows that miss a limit, high": [0.125, 0.25, 0.375, 0.5, "nan", 0.75],
+            "median residual_quantile, value": [3e-06, 6e-06, 9e-06, 1.2e-05, 1.5e-05, 1.8e-05],
+            "median residual_quantile, low": [1.5e-06, 3e-06, 4.5e-06, 6e-06, 7.5e-06, 9e-06],
+            "median residual_quantile, high": [7.5e-06, 1.5e-05, 2.25e-05, 3e-05, 3.75e-05, 4.5e-05],
+            "median margin, value": [3.0, 6.0, 9.0, 12.0, 15.0, 18.0],
+            "median margin, low": [1.5, 3.0, 4.5, 6.0, 7.5, 9.0],
+            "median margin, high": [7.5, 15.0, 22.5, 30.0, 37.5, 45.0],
+        },
+        "Sheet width=7.6 height=2.16 widths=[1 1] share_y=True",
+        ("Panel 0 0 x=<title=one.a ticks={0: x, 1: y} grid=False size=8> y=<title=two.b low=2.5 high=-0.5"),
+        ("  ticks={0: 1, 1: 2, 2: 3} grid=False size=8> title=rows that miss a limit (%) face=#dddddd"),
+        "Field x=[0 1] y=[0 1 2] z=[[10 40] [20 nan] [30 60]] low=10 high=60",
+        "Words text=10 x=0 y=0 colour=#ffffff anchor=middle",
+        "Words text=40 x=1 y=0 anchor=middle",
+        "Words text=20 x=0 y=1 colour=#ffffff anchor=middle",
+        "Words text=none x=1 y=1 anchor=middle",
+        "Words text=30 x=0 y=2 colour=#ffffff anchor=middle",
+        "Words text=60 x=1 y=2 anchor=middle",
+        ("Panel 0 1 x=<title=one.a ticks={0: x, 1: y} grid=False size=8> y=<low=2.5 high=-0.5 ticks={0: 1,"),
+        "  1: 2, 2: 3} grid=False size=8> title=median residual_quantile (µrad) face=#dddddd",
+        "Field x=[0 1] y=[0 1 2] z=[[3 12] [6 15] [9 18]] low=3 high=18",
+        "Words text=3 x=0 y=0 colour=#ffffff anchor=middle",
+        "Words text=12 x=1 y=0 anchor=middle",
+        "Words text=6 x=0 y=1 colour=#ffffff anchor=middle",
+        "Words text=15 x=1 y=1 anchor=middle",
+        "Words text=9 x=0 y=2 colour=#ffffff anchor=middle",
+        "Words text=18 x=1 y=2 anchor=middle",
+    ]
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_worst_row_has_its_radial_error_and_each_drive(axes):
+    error = np.array([[30e-6, 40e-6], [3e-6, -4e-6], [-6e-6, 8e-6]])
+    drive = np.array([[1.0, -2.0], [3.0, 5.0], [7.0, 4.0]])
+    trace = WorstTrace(1, 17, "residual_quantile", 9.5e-6, np.array([0.0, 0.5, 1.0]), error[:, :axes], drive[:, :axes])
+    figure = drawing.worst(two_cells(), trace, 2)
+    assert (figure.name, figure.title) == ("campaign-worst-2-2", "Second worst row in time")
+    radial = plain(figure.columns["radial error (rad)"])
+    assert radial == ([3e-5, 3e-6, 6e-6], [5e-5, 5e-6, 1e-5])[axes - 1]
+    drawn_, *below = [plain(mark.y) for panel in figure.sheet.panels for mark in panel.marks]
+    assert drawn_ == [plain(1e6 * each) for each in radial] and below == [[1.0, 3.0, 7.0], [-2.0, 5.0, 4.0]][:axes]
+    assert figure.caption == (
+        "Row 17 of mirror = a.toml, aperture = 5 cm: of its rows the second worst in residual_quantile, 9.50 µrad. "
+        "Shown is the first run of the row's."
+    )
+
+
+def test_the_tables_of_two_combinations_have_each_ones_own_numbers():
+    summary = two_cells()
+    cell, t = summary.cells[1], campaign_tables
+    found = [
+        t.limit_table(summary, cell),
+        t.output_table(cell, 3, intervals=True),
+        t.meanings_table(cell),
+        t.cell_table(summary, summary.cells),
+        t.limited_table(summary, summary.cells),
+        t.tail_table(cell.tail),
+        t.index_table(summary.sensitivities),
+        t.failed_table(summary, 2),
+    ]
+    assert plain([[each.headings, each.rows] for each in found]) == [
+        [
+            ["limit", "missed by", "90 % interval", "from"],
+            [
+                ["residual_quantile ≤ 6 µrad", "25 %", "12.5 % to 31.2 %", "requirement.pointing_error"],
+                ["margin ≥ 0.50 dB and ≤ 12.00 dB", "5 %", "2.5 % to 6.25 %", "requirement.margin"],
+            ],
+        ],
+        [
+            ["output", "mean", "deviation", "1 %", "50 %", "99 %"],
+            [
+                [
+                    "residual_quantile",
+                    "4.00 µrad",
+                    "1.50 µrad",
+                    "1.50 µrad\n750 nrad to 1.88 µrad",
+                    "3.00 µrad\n1.50 µrad to 3.75 µrad",
+                    "7.50 µrad\n3.75 µrad to 9.38 µrad",
+                ],
+                [
+                    "margin",
+                    "4.00 dB",
+                    "1.50 dB",
+                    "1.50 dB\n0.75 dB to 1.88 dB",
+                    "3.00 dB\n1.50 dB to 3.75 dB",
+                    "7.50 dB\n3.75 dB to 9.38 dB",
+                ],
+            ],
+        ],
+        [["output", "meaning"], [["residual_quantile", "what it is"], ["margin", "what it is"]]],
+        [
+            ["mirror", "aperture", "keep all", "rows", "failed"],
+            [
+                ["b.toml", "6 cm", "25 % (6.25 % to 62.5 %)", "24", "0"],
+                ["a.toml", "5 cm", "75 % (68.8 % to 87.5 %)", "20", "1"],
+            ],
+        ],
+        [
+            ["mirror", "aperture", "mean residual_quantile", "miss residual_quantile", "mean margin", "miss margin"],
+            [
+                ["b.toml", "6 cm", "8.00 µrad", "75 %", "8.00 dB", "15 %"],
+                ["a.toml", "5 cm", "4.00 µrad", "25 %", "4.00 dB", "5 %"],
+            ],
+        ],
+        [
+            ["probability", "radial error", "90 % interval"],
+            [
+                ["10 %", "1.75 µrad", "1.50 µrad to 2.00 µrad"],
+                ["0.1 %", "3.20 µrad", "at least 3.00 µrad"],
+                ["10⁻⁶", "not known", ""],
+            ],
+        ],
+        [
+            ["output", "input", "first order", "total", "rank correlation"],
+            [
+                [
+                    "residual_quantile",
+                    "jitter.rms",
+                    "0.50 (0.25 to 0.62)",
+                    "0.62 (0.60 to 0.75)",
+                    "0.75 (0.38 to 0.84)",
+                ],
+                [
+                    "residual_quantile",
+                    "mirror.alpha",
+                    "0.25 (0.12 to 0.31)",
+                    "0.30 (0.15 to 0.38)",
+                    "−0.50 (−0.62 to −0.38)",
+                ],
+                ["margin", "mirror.alpha", "0.70 (−0.35 to 1.05)", "", ""],
+            ],
+        ],
+        [
+            ["row", "seed", "tries", "reason"],
+            [
+                ["2 of mirror = a.toml, aperture = 5 cm", "99", "3", "a reason"],
+                ["7 of mirror = b.toml, aperture = 6 cm", "98", "1", "another"],
+            ],
+        ],
+    ]
+
+
+def test_all_sentences_of_two_combinations():
+    summary = two_cells()
+    w = campaign_words
+    assert [
+        w.verdict(summary),
+        w.headline(summary),
+        *w.answers(summary, summary.cells[1]),
+        w.tail_method(summary.cells[1].tail),
+        w.progress_words(summary),
+        *w.setting(summary),
+        *w.few_values(summary.cells[1]),
+    ] == [
+        "open",
+        (
+            "So far: 1 of 45 rows failed; of 2 combinations, mirror = a.toml, aperture = 5 cm "
+            "keeps both limits most often, in 75 % (68.8 % to 87.5 %) of its rows; mirror = "
+            "b.toml, aperture = 6 cm least often, in 25 % (6.25 % to 62.5 %) (intervals at 90 "
+            "%)."
+        ),
+        (
+            "What matters most to residual_quantile (total Sobol index): jitter.rms 0.62 (0.60 "
+            "to 0.75), mirror.alpha 0.30 (0.15 to 0.38); a note."
+        ),
+        "What matters most to margin (first-order Sobol index): mirror.alpha 0.70 (−0.35 to 1.05).",
+        ("The radial error exceeds 3.20 µrad with probability 0.1 % (at least 3.00 µrad at 90 % confidence)."),
+        (
+            "The radial error is beyond 2.5 µrad with probability 1 % (0.5 % to 2.5 % at 90 % "
+            "confidence). The variance of that estimate is 4e-08, that of 2.5e+05 draws "
+            "without importance sampling."
+        ),
+        "No radial error beyond 6 µrad was seen (0 % to 0.4 % at 90 % confidence).",
+        (
+            "It comes from the share of the time of 64 rows. It knows 0.1 % as well as 32 "
+            "million independent samples of the error would."
+        ),
+        "Running: 41 of 64 rows, 2.05 rows a second, 5 min left.",
+        "Sampling lhs, 2 drawn inputs, seed 77.",
+        "Loop: PI, 5 s.",
+        "Set: link.range = 1 km, b.c = 2.",
+    ]
+
+
+def test_the_data_of_two_combinations_have_every_number_under_its_own_name():
+    assert plain(campaign_data(two_cells())) == {
+        "name": "a.toml",
+        "mission": "m",
+        "verdict": (
+            "So far: 1 of 45 rows failed; of 2 combinations, mirror = a.toml, aperture = 5 cm "
+            "keeps both limits most often, in 75 % (68.8 % to 87.5 %) of its rows; mirror = "
+            "b.toml, aperture = 6 cm least often, in 25 % (6.25 % to 62.5 %) (intervals at 90 "
+            "%)."
+        ),
+        "findings": ["found"],
+        "hashes": {"campaign": "c", "mission": "d", "code": "e"},
+        "seed": 77,
+        "sampling": "lhs",
+        "loop": "PI, 5 s",
+        "inputs": [
+            {"key": "mirror.alpha", "unit": "", "distribution": "normal"},
+            {"key": "jitter.rms", "unit": "rad", "distribution": "uniform"},
+        ],
+        "set": {"link.range": "1 km", "b.c": "2"},
+        "limits": [
+            {
+                "output": "residual_quantile",
+                "least": None,
+                "most": 6e-06,
+                "source": "requirement.pointing_error",
+                "unit": "rad",
+            },
+            {"output": "margin", "least": 0.5, "most": 12.0, "source": "requirement.margin", "unit": "dB"},
+        ],
+        "cells": [
+            {
+                "values": {"mirror": "b.toml", "aperture": "6 cm"},
+                "rows": 24,
+                "failed": 0,
+                "missed": {"value": 0.75, "low": 0.375, "high": 0.9375, "confidence": 0.9},
+                "missed_by": {
+                    "residual_quantile": {"value": 0.75, "low": 0.375, "high": 0.9375, "confidence": 0.9},
+                    "margin": {"value": 0.15, "low": 0.075, "high": 0.1875, "confidence": 0.9},
+                },
+                "outputs": [
+                    {
+                        "name": "residual_quantile",
+                        "unit": "rad",
+                        "meaning": "what it is",
+                        "rows": 20,
+                        "deviation": 3e-06,
+                        "least": 2e-06,
+                        "most": 1.8e-05,
+                        "mean": {"value": 8e-06, "low": 4e-06, "high": 1e-05, "confidence": 0.9},
+                        "quantiles": [
+                            {"probability": 0.01, "value": 3e-06, "low": 1.5e-06, "high": 3.75e-06, "confidence": 0.9},
+                            {"probability": 0.5, "value": 6e-06, "low": 3e-06, "high": 7.5e-06, "confidence": 0.9},
+                            {"probability": 0.997, "value": 1.6e-05, "low": 1.4e-05, "high": "nan", "confidence": 0.9},
+                            {
+                                "probability": 0.99,
+                                "value": 1.5e-05,
+                                "low": 7.5e-06,
+                                "high": 1.875e-05,
+                                "confidence": 0.9,
+                            },
+                        ],
+                        "edges": [2e-06, 4e-06, 8e-06, 1.6e-05, 1.8e-05],
+                        "counts": [2.0, 9.0, 6.0, 3.0],
+                    },
+                    {
+                        "name": "margin",
+                        "unit": "dB",
+                        "meaning": "what it is",
+                        "rows": 20,
+                        "deviation": 3.0,
+                        "least": 2.0,
+                        "most": 18.0,
+                        "mean": {"value": 8.0, "low": 4.0, "high": 10.0, "confidence": 0.9},
+                        "quantiles": [
+                            {"probability": 0.01, "value": 3.0, "low": 1.5, "high": 3.75, "confidence": 0.9},
+                            {"probability": 0.5, "value": 6.0, "low": 3.0, "high": 7.5, "confidence": 0.9},
+                            {"probability": 0.997, "value": 16.0, "low": 14.0, "high": "nan", "confidence": 0.9},
+                            {"probability": 0.99, "value": 15.0, "low": 7.5, "high": 18.75, "confidence": 0.9},
+                        ],
+                        "edges": [2.0, 4.0, 8.0, 16.0, 18.0],
+                        "counts": [2.0, 9.0, 6.0, 3.0],
+                    },
+                ],
+                "tail": None,
+            },
+            {
+                "values": {"mirror": "a.toml", "aperture": "5 cm"},
+                "rows": 20,
+                "failed": 1,
+                "missed": {"value": 0.25, "low": 0.125, "high": 0.3125, "confidence": 0.9},
+                "missed_by": {
+                    "residual_quantile": {"value": 0.25, "low": 0.125, "high": 0.3125, "confidence": 0.9},
+                    "margin": {"value": 0.05, "low": 0.025, "high": 0.0625, "confidence": 0.9},
+                },
+                "outputs": [
+                    {
+                        "name": "residual_quantile",
+                        "unit": "rad",
+                        "meaning": "what it is",
+                        "rows": 20,
+                        "deviation": 1.5e-06,
+                        "least": 1e-06,
+                        "most": 9e-06,
+                        "mean": {"value": 4e-06, "low": 2e-06, "high": 5e-06, "confidence": 0.9},
+                        "quantiles": [
+                            {
+                                "probability": 0.01,
+                                "value": 1.5e-06,
+                                "low": 7.5e-07,
+                                "high": 1.875e-06,
+                                "confidence": 0.9,
+                            },
+                            {"probability": 0.5, "value": 3e-06, "low": 1.5e-06, "high": 3.75e-06, "confidence": 0.9},
+                            {"probability": 0.997, "value": 8e-06, "low": 7e-06, "high": "nan", "confidence": 0.9},
+                            {
+                                "probability": 0.99,
+                                "value": 7.5e-06,
+                                "low": 3.75e-06,
+                                "high": 9.375e-06,
+                                "confidence": 0.9,
+                            },
+                        ],
+                        "edges": [1e-06, 2e-06, 4e-06, 8e-06, 9e-06],
+                        "counts": [2.0, 9.0, 6.0, 3.0],
+                    },
+                    {
+                        "name": "margin",
+                        "unit": "dB",
+                        "meaning": "what it is",
+                        "rows": 20,
+                        "deviation": 1.5,
+                        "least": 1.0,
+                        "most": 9.0,
+                        "mean": {"value": 4.0, "low": 2.0, "high": 5.0, "confidence": 0.9},
+                        "quantiles": [
+                            {"probability": 0.01, "value": 1.5, "low": 0.75, "high": 1.875, "confidence": 0.9},
+                            {"probability": 0.5, "value": 3.0, "low": 1.5, "high": 3.75, "confidence": 0.9},
+                            {"probability": 0.997, "value": 8.0, "low": 7.0, "high": "nan", "confidence": 0.9},
+                            {"probability": 0.99, "value": 7.5, "low": 3.75, "high": 9.375, "confidence": 0.9},
+                        ],
+                        "edges": [1.0, 2.0, 4.0, 8.0, 9.0],
+                        "counts": [2.0, 9.0, 6.0, 3.0],
+                    },
+                ],
+                "tail": {
+                    "radius_rad": [1e-06, 2e-06, 3e-06, 4e-06],
+                    "survival": [0.5, 0.05, 0.002, 0.0],
+                    "low": [0.4, 0.04, 0.0, 0.0],
+                    "high": [0.6, 0.07, 0.01, 0.004],
+                    "wanted": [
+                        {
+                            "probability": 0.1,
+                            "unit": "rad",
+                            "value": 1.75e-06,
+                            "low": 1.5e-06,
+                            "high": 2e-06,
+                            "confidence": 0.9,
+                        },
+                        {
+                            "probability": 0.001,
+                            "unit": "rad",
+                            "value": 3.2e-06,
+                            "low": 3e-06,
+                            "high": "nan",
+                            "confidence": 0.9,
+                        },
+                        {
+                            "probability": 1e-06,
+                            "unit": "rad",
+                            "value": "nan",
+                            "low": "nan",
+                            "high": "nan",
+                            "confidence": 0.9,
+                        },
+                    ],
+                    "beyond": [
+                        {
+                            "error_rad": 2.5e-06,
+                            "value": 0.01,
+                            "low": 0.005,
+                            "high": 0.025,
+                            "confidence": 0.9,
+                            "variance": 4e-08,
+                        }
+                    ],
+                    "confidence": 0.9,
+                    "method": "share of the time of 64 rows",
+                    "effective_runs": 32000000.0,
+                },
+            },
+        ],
+        "sensitivities": [
+            {
+                "output": "residual_quantile",
+                "rows": 40,
+                "first": {
+                    "mirror.alpha": {"value": 0.25, "low": 0.125, "high": 0.3125, "confidence": 0.9},
+                    "jitter.rms": {"value": 0.5, "low": 0.25, "high": 0.625, "confidence": 0.9},
+                },
+                "total": {
+                    "mirror.alpha": {"value": 0.3, "low": 0.15, "high": 0.375, "confidence": 0.9},
+                    "jitter.rms": {"value": 0.625, "low": 0.6, "high": 0.75, "confidence": 0.9},
+                },
+                "rank_correlation": {
+                    "mirror.alpha": {"value": -0.5, "low": -0.625, "high": -0.375, "confidence": 0.9},
+                    "jitter.rms": {"value": 0.75, "low": 0.375, "high": 0.84375, "confidence": 0.9},
+                },
+                "surrogate_q2": 0.95,
+                "note": "a note",
+            },
+            {
+                "output": "margin",
+                "rows": 30,
+                "first": {"mirror.alpha": {"value": 0.7, "low": -0.35, "high": 1.05, "confidence": 0.9}},
+                "total": {},
+                "rank_correlation": {},
+                "surrogate_q2": "nan",
+                "note": "",
+            },
+        ],
+        "worst": [],
+        "failed": [
+            {"cell": 1, "row": 2, "seed": 99, "attempts": 3, "reason": "a reason"},
+            {"cell": 0, "row": 7, "seed": 98, "attempts": 1, "reason": "another"},
+        ],
+        "progress": {
+            "rows_done": 41,
+            "rows_total": 64,
+            "seconds": 20.0,
+            "rows_per_s": 2.05,
+            "left_s": 300.0,
+            "state": "running",
+        },
+        "warnings": ["a warning"],
+    }
