@@ -9,13 +9,15 @@ import pytest
 import xarray
 
 from budget_files import kept_study, looped_study
+from drawn import figure_of, plain
 from microrad import report
-from microrad.link.error_budget import ErrorSource, Requirement, Spread, assembly
+from microrad.link.error_budget import ErrorSource, Requirement, Share, Spread, assembly
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.report.error_budget import figures, page
 from microrad.report.error_budget import words as budget_words
 from microrad.report.error_budget.data import budget_data
 from microrad.report.error_budget.page import budget_view
+from microrad.report.fine_pointing.windows import index_text
 from microrad.report.plotting.sheet import Bars, Line, Rule
 from microrad.report.quantities import micro, percent
 from microrad.report.results import tolerances
@@ -297,3 +299,381 @@ def test_a_source_that_a_requirement_does_not_count_has_empty_cells():
 )
 def test_rules_are_too_small_by_more_than_a_thousandth(rules_rad, said):
     assert budget_words._too_small([judged_of(rules_rad=rules_rad)]) == said
+
+
+# ------------------------------------------------------------------- two unlike requirements, held as a whole
+def a_share(name, kind, k, total_rad, allowed):
+    """What one source means; all of its numbers follow from ``k``."""
+    made = SimpleNamespace(name=name, kind=kind, statistic=f"statistic {k}", origin=f"origin {k}")
+    moments = np.array([3e-7, 4e-7]) * k, np.array([5e-7, 12e-7]) * k
+    return Share(made, total_rad, *moments, 1e-6 * (k + 1), 0.0625 * k, allowed)
+
+
+def two_requirements():
+    """One with a limit that is missed by the rules alone, about two axes; one about one axis without a limit."""
+    first = Requirement(ErrorIndex("APE"), 0.9973, "mixed", (0, 1), 5e-6)
+    second = Requirement(ErrorIndex("PDE", 0.5, 3.0), 0.95, "ensemble", (1,), None, 60.0)
+    found = []
+    for required, name, rules_rad, quantile_rad in (
+        (first, "code_word", 6e-6, 4e-6),
+        (second, "slow_drift", 2e-6, 3e-6),
+    ):
+        total = SimpleNamespace(
+            required=required,
+            by_rules_rad=rules_rad,
+            quantile_rad=quantile_rad,
+            mean_rad=np.array([6e-7, 8e-7]),
+            sigma_rad=np.array([9e-7, 12e-7]),
+            holds=None if required.limit_rad is None else True,
+        )
+        names = [("tip_tilt", "random"), ("heat", "drift"), ("wheel", "loop"), ("bias", "constant")]
+        allowed = [1.5, math.inf, 0.0, None]
+        shares = [a_share(*of, k + 1, quantile_rad, allowed[k]) for k, of in enumerate(names)]
+        shares = shares[::-1] if name == "code_word" else shares[:2]
+        curves = {"size_rad": np.array([0.0, 2e-6, 8e-6]), "beyond": np.array([1.0, 0.25, 0.0])}
+        found.append(SimpleNamespace(name=name, total=total, shares=shares, **curves))
+    return found
+
+
+def two_spectra():
+    freq = np.array([1.0, 10.0, 100.0])
+    spectra = {"left_over": np.array([4e-12, 2e-12, 1e-12]), "other": np.array([1e-12, 8e-12, np.nan])}
+    lines = {"fan_one": 20.0, "pump": 50.0}
+    return SimpleNamespace(judged=two_requirements(), freq_hz=freq, spectra=spectra, lines_hz=lines)
+
+
+@pytest.mark.parametrize("stacked", [False, True])
+def test_each_contribution_stands_in_the_panel_of_its_requirement(stacked):
+    figure = figures.contributions(two_requirements(), stacked)
+    assert [(p.row, p.column) for p in figure.sheet.panels] == ([(0, 0), (1, 0)] if stacked else [(0, 0), (0, 1)])
+    assert (figure.sheet.heights, figure.sheet.widths) == (((1, 1), (1,)) if stacked else ((1,), (1, 1)))
+
+
+def test_contributions_to_two_unlike_requirements_as_a_whole():
+    assert figure_of(figures.contributions(two_requirements())) == [
+        "pointing-errors-contributions",
+        "What each source contributes",
+        (
+            "What each source contributes to the total by the distribution, in the share by "
+            "which the total grows with it: the bars of a requirement add up to its total. "
+            "Colours are the classes."
+        ),
+        {
+            "source": ["bias", "wheel", "heat", "tip_tilt"],
+            "contribution to code_word (rad)": [1e-06, 7.5e-07, 5e-07, 2.5e-07],
+            "contribution to slow_drift (rad)": ["nan", "nan", 3.75e-07, 1.875e-07],
+        },
+        "Sheet width=7.6 height=2.34 widths=[1 1] share_y=True legend=<place=above columns=8>",
+        ("Panel 0 0 x=<title=contribution (µrad) low=0 high=1.35 most=4> y=<low=3.6 high=-0.6 ticks={0:"),
+        "  bias, 1: wheel, 2: heat, 3: tip tilt} grid=False size=8> title=code word",
+        "Bars at=[0] start=[0] end=[1] breadth=[0.68] colour=#0072B2 label=constant",
+        "Bars at=[1] start=[0] end=[0.75] breadth=[0.68] colour=#777777 label=loop",
+        "Bars at=[2] start=[0] end=[0.5] breadth=[0.68] colour=#D55E00 label=drift",
+        "Bars at=[3] start=[0] end=[0.25] breadth=[0.68] colour=#E69F00 label=random",
+        "Words text=1.00 x=1 y=0 size=7.5 shift=[3 0]",
+        "Words text=0.750 x=0.75 y=1 size=7.5 shift=[3 0]",
+        "Words text=0.500 x=0.5 y=2 size=7.5 shift=[3 0]",
+        "Words text=0.250 x=0.25 y=3 size=7.5 shift=[3 0]",
+        ("Panel 0 1 x=<title=contribution (µrad) low=0 high=0.50625 most=4> y=<low=3.6 high=-0.6 ticks={0:"),
+        "  bias, 1: wheel, 2: heat, 3: tip tilt} grid=False size=8> title=slow drift",
+        "Bars at=[0] start=[0] end=[0] breadth=[0.68] colour=#0072B2 label=constant",
+        "Bars at=[1] start=[0] end=[0] breadth=[0.68] colour=#777777 label=loop",
+        "Bars at=[2] start=[0] end=[0.375] breadth=[0.68] colour=#D55E00 label=drift",
+        "Bars at=[3] start=[0] end=[0.1875] breadth=[0.68] colour=#E69F00 label=random",
+        "Words text=0 x=0 y=0 size=7.5 shift=[3 0]",
+        "Words text=0 x=0 y=1 size=7.5 shift=[3 0]",
+        "Words text=0.375 x=0.375 y=2 size=7.5 shift=[3 0]",
+        "Words text=0.188 x=0.1875 y=3 size=7.5 shift=[3 0]",
+    ]
+
+
+def test_distributions_under_two_unlike_requirements_as_a_whole():
+    assert figure_of(figures.distributions(two_requirements())) == [
+        "pointing-errors-distribution",
+        "Distribution of each pointing error",
+        (
+            "Share of the times, satellites or both, as the requirement counts them, with a "
+            "larger error, by the full distribution. The dot is the total, where no more than "
+            "the share that is allowed lies beyond: left of the limit the requirement is met."
+        ),
+        {
+            "size, code_word (rad)": [0.0, 2e-06, 8e-06],
+            "share beyond it, code_word": [1.0, 0.25, 0.0],
+            "size, slow_drift (rad)": [0.0, 2e-06, 8e-06],
+            "share beyond it, slow_drift": [1.0, 0.25, 0.0],
+        },
+        "Sheet width=7.6 height=3.25 widths=[1 1] legend=<place=above columns=5>",
+        ("Panel 0 0 x=<title=radial error (µrad) low=0 high=8 most=6> y=<title=larger errors (%) log=True"),
+        "  low=0.009 high=200> title=code word: APE, 99.73 %",
+        "Line x=[0 2 8] y=[100 25 0.0009] colour=#0072B2 width=1.6 label=larger errors",
+        "Rule at=5 upright=True colour=#D55E00 dash=-- width=1.4 label=limit",
+        "Rule at=6 upright=True colour=#777777 dash=-. width=1.2 label=total by the rules",
+        "Rule at=0.27 upright=False dash=: width=0.9 label=share allowed",
+        "Line x=[4] y=[0.27] dash= label=total by the distribution marker=o",
+        ("Panel 0 1 x=<title=error about y (µrad) low=0 high=8 most=6> y=<title=larger errors (%) log=True"),
+        "  low=0.166667 high=200> title=slow drift: PDE 500 ms 3 s apart, 95 %",
+        "Line x=[0 2 8] y=[100 25 0.0166667] colour=#0072B2 width=1.6 label=larger errors",
+        "Rule at=2 upright=True colour=#777777 dash=-. width=1.2 label=total by the rules",
+        "Rule at=5 upright=False dash=: width=0.9 label=share allowed",
+        "Line x=[3] y=[5] dash= label=total by the distribution marker=o",
+    ]
+
+
+def test_spectra_beside_the_window_of_the_one_requirement_that_has_one_as_a_whole():
+    assert figure_of(figures.spectra(two_spectra())) == [
+        "pointing-errors-spectrum",
+        "Spectra of pointing errors and the windows",
+        (
+            "Above: one-sided spectra of the sources that have one, about all axes together. "
+            "Below: the share of them that each window counts, where it ripples its mean about "
+            "a frequency. Of an APE all counts, and of the difference of two means up to four "
+            "times as much."
+        ),
+        {
+            "frequency (Hz)": [1.0, 10.0, 100.0],
+            "left_over (rad^2/Hz)": [4e-12, 2e-12, 1e-12],
+            "other (rad^2/Hz)": [1e-12, 8e-12, "nan"],
+            "weight of PDE 500 ms 3 s apart": [0.939987, 0.247931, 0.00473181],
+        },
+        "Sheet width=7.6 height=5.2 heights=[1.25 1] share_x=True legend=<place=above columns=2>",
+        ("Panel 0 0 x=<log=True low=1 high=100> y=<title=spectrum, all axes (µrad²/Hz) log=True low=8e-06"),
+        "  high=24>",
+        "Line x=[1 10 100] y=[4 2 1] colour=#0072B2 label=left over",
+        "Line x=[1 10 100] y=[1 8 nan] colour=#D55E00 dash=-- label=other",
+        "Rule at=20 upright=True colour=#777777 dash=: width=1.2 label=periodic: fan one, pump",
+        "Rule at=50 upright=True colour=#777777 dash=: width=1.2 label=periodic: fan one, pump",
+        ("Panel 1 0 x=<title=frequency (Hz) log=True low=1 high=100> y=<title=weight of the window (1)"),
+        "  low=0>",
+        ("Line x=[1 10 100] y=[0.939987 0.247931 0.00473181] colour=#009E73 dash=-. label=weight of PDE"),
+        "  500 ms 3 s apart: slow drift",
+    ]
+
+
+def test_tables_of_two_unlike_requirements_as_a_whole():
+    view = budget_view(two_spectra(), (), ["A further remark."])
+    assert views_text([view], 130).split("\n") == [
+        "Pointing error budget",
+        "",
+        "Requirements, µrad",
+        "",
+        (
+            " requirement   what is kept, how often                                            "
+            "     by the rules   by the distribution   limit"
+        ),
+        (
+            " "
+            "──────────────────────────────────────────────────────────────────────────────────"
+            "──────────────────────────────────────────────"
+        ),
+        (
+            " code word     APE, radial, 99.73 % of the satellites and times                   "
+            "     6.00 FAIL      4.00 PASS             5.00"
+        ),
+        (" slow drift    PDE 500 ms 3 s apart within 60 s, about y, 95 % of the satellites, at   2.00           3.00"),
+        "               their worst time",
+        "",
+        "Contributions, µrad",
+        "",
+        " source     class      statistic     code word   share   slow drift   share   from",
+        " ─────────────────────────────────────────────────────────────────────────────────────",
+        " bias       constant   statistic 4   1.00        25 %                         origin 4",
+        " wheel      loop       statistic 3   0.750       19 %                         origin 3",
+        " heat       drift      statistic 2   0.500       12 %    0.375        12 %    origin 2",
+        " tip tilt   random     statistic 1   0.250       6.2 %   0.188        6.2 %   origin 1",
+        " all                                 4.00                3.00",
+        "",
+        "code word: each source",
+        "",
+        "APE, radial, 99.73 % of the satellites and times, µrad.",
+        "",
+        " source     mean    deviation   weight   total without it   may be",
+        " ──────────────────────────────────────────────────────────────────────────",
+        " bias       2.00    5.20        25 %     5.00",
+        " wheel      1.50    3.90        19 %     4.00               nothing is left",
+        " heat       1.00    2.60        12 %     3.00               any",
+        " tip tilt   0.500   1.30        6.2 %    2.00               1.5 times",
+        " all        1.00    1.50        100 %    4.00",
+        "",
+        "slow drift: each source",
+        "",
+        ("PDE 500 ms 3 s apart within 60 s, about y, 95 % of the satellites, at their worst time, µrad."),
+        "",
+        " source     mean    deviation   weight   total without it",
+        " ────────────────────────────────────────────────────────",
+        " tip tilt   0.500   1.30        6.2 %    2.00",
+        " heat       1.00    2.60        12 %     3.00",
+        " all        1.00    1.50        100 %    3.00",
+        "",
+        (
+            "- By the rules: abs(mean) + n_p deviations, about two axes of their lengths "
+            "(ECSS-E-ST-60-10C 4.2.4). By the distribution: the"
+        ),
+        "  sources convolved, without the central limit; by it a requirement is judged.",
+        (
+            "- Weight: growth of the total for a source that grows by 1 %, in percent. "
+            "Contribution: that share of the total, so that"
+        ),
+        (
+            "  contributions add up to it. May be: how many times as large a source may be "
+            "until the limit is met, the others as they are."
+        ),
+        (
+            "- What the loop leaves is that of linear theory: each hysteresis element counts "
+            "by its slow gain, in a mirror of several axes by"
+        ),
+        "  that about rest.",
+        "- The rules are too small for slow drift (33 %).",
+        "- A further remark.",
+    ]
+    assert [[each.words, each.totals, each.cards, each.brief] for each in tables(view)] == [
+        [
+            (
+                0,
+                1,
+            ),
+            0,
+            True,
+            (),
+        ],
+        [
+            (
+                0,
+                1,
+                2,
+                7,
+            ),
+            1,
+            True,
+            (
+                0,
+                3,
+                5,
+            ),
+        ],
+    ]
+
+
+def test_data_of_two_unlike_requirements_as_a_whole():
+    assert plain(budget_data(two_spectra())) == [
+        {
+            "requirement": "code_word",
+            "index": "APE",
+            "window_s": None,
+            "spacing_s": None,
+            "observation_s": None,
+            "confidence": 0.9973,
+            "interpretation": "mixed",
+            "axes": "radial",
+            "limit_rad": 5e-06,
+            "mean_rad": [6e-07, 8e-07],
+            "sigma_rad": [9e-07, 1.2e-06],
+            "by_rules_rad": 6e-06,
+            "by_distribution_rad": 4e-06,
+            "holds": True,
+            "sources": [
+                {
+                    "name": "bias",
+                    "class": "constant",
+                    "statistic": "statistic 4",
+                    "mean_rad": [1.2e-06, 1.6e-06],
+                    "sigma_rad": [2e-06, 4.8e-06],
+                    "weight": 0.25,
+                    "contribution_rad": 1e-06,
+                    "total_without_it_rad": 5e-06,
+                    "may_be_times": None,
+                    "origin": "origin 4",
+                },
+                {
+                    "name": "wheel",
+                    "class": "loop",
+                    "statistic": "statistic 3",
+                    "mean_rad": [9e-07, 1.2e-06],
+                    "sigma_rad": [1.5e-06, 3.6e-06],
+                    "weight": 0.1875,
+                    "contribution_rad": 7.5e-07,
+                    "total_without_it_rad": 4e-06,
+                    "may_be_times": 0.0,
+                    "origin": "origin 3",
+                },
+                {
+                    "name": "heat",
+                    "class": "drift",
+                    "statistic": "statistic 2",
+                    "mean_rad": [6e-07, 8e-07],
+                    "sigma_rad": [1e-06, 2.4e-06],
+                    "weight": 0.125,
+                    "contribution_rad": 5e-07,
+                    "total_without_it_rad": 3e-06,
+                    "may_be_times": None,
+                    "origin": "origin 2",
+                },
+                {
+                    "name": "tip_tilt",
+                    "class": "random",
+                    "statistic": "statistic 1",
+                    "mean_rad": [3e-07, 4e-07],
+                    "sigma_rad": [5e-07, 1.2e-06],
+                    "weight": 0.0625,
+                    "contribution_rad": 2.5e-07,
+                    "total_without_it_rad": 2e-06,
+                    "may_be_times": 1.5,
+                    "origin": "origin 1",
+                },
+            ],
+        },
+        {
+            "requirement": "slow_drift",
+            "index": "PDE",
+            "window_s": 0.5,
+            "spacing_s": 3.0,
+            "observation_s": 60.0,
+            "confidence": 0.95,
+            "interpretation": "ensemble",
+            "axes": "about y",
+            "limit_rad": None,
+            "mean_rad": [6e-07, 8e-07],
+            "sigma_rad": [9e-07, 1.2e-06],
+            "by_rules_rad": 2e-06,
+            "by_distribution_rad": 3e-06,
+            "holds": None,
+            "sources": [
+                {
+                    "name": "tip_tilt",
+                    "class": "random",
+                    "statistic": "statistic 1",
+                    "mean_rad": [3e-07, 4e-07],
+                    "sigma_rad": [5e-07, 1.2e-06],
+                    "weight": 0.0625,
+                    "contribution_rad": 1.875e-07,
+                    "total_without_it_rad": 2e-06,
+                    "may_be_times": 1.5,
+                    "origin": "origin 1",
+                },
+                {
+                    "name": "heat",
+                    "class": "drift",
+                    "statistic": "statistic 2",
+                    "mean_rad": [6e-07, 8e-07],
+                    "sigma_rad": [1e-06, 2.4e-06],
+                    "weight": 0.125,
+                    "contribution_rad": 3.75e-07,
+                    "total_without_it_rad": 3e-06,
+                    "may_be_times": None,
+                    "origin": "origin 2",
+                },
+            ],
+        },
+    ]
+    assert budget_words.most(two_requirements()[1]) == "tip tilt: 0.188 µrad of 3.00 µrad, 6.2 % of the total"
+
+
+@pytest.mark.parametrize(
+    ("index", "text"),
+    [
+        (ErrorIndex("APE"), "APE"),
+        (ErrorIndex("RPE", 0.25), "RPE 250 ms"),
+        (ErrorIndex("PRE", 0.5, 90.0), "PRE 500 ms 90 s apart"),
+    ],
+)
+def test_an_index_is_named_with_its_times(index, text):
+    assert index_text(index) == text

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import re
+import textwrap
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
@@ -13,7 +14,7 @@ import pytest
 from microrad.report.day.figures import Assumed, assumptions, empty
 from microrad.report.page import templates as scripts
 from microrad.report.page.templates import templates
-from microrad.report.plotting import scales
+from microrad.report.plotting import interactive, scales
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.interactive import numbers, plot_of, spoken, text_of, words
 from microrad.report.plotting.layout import layout
@@ -1050,3 +1051,556 @@ def test_pictures_of_words_alone_are_the_static_ones():
         assert figure.plot == ""
         assert said in figure.svg
     assert assumptions([Assumed("a", 1.0, 2.0)], 1.5, "ratio (1)").plot != ""
+
+
+# ------------------------------------------------------------------------------------- sheets with all of it together
+def every_kind():
+    """Two panels above each other with every kind of mark, unlike each other in each field."""
+    sheet = Sheet(
+        6.0, 5.0, (1.0, 2.0), share_x=True, legend=Legend("below", 2), heading="Head & <b>", heading_colour=GREY
+    )
+    above, below = sheet.panel(0), sheet.panel(1)
+    above.title, above.face, above.framed = "First", "#eeeeee", True
+    above.y = Axis("gain (dB)", low=-2.0, high=6.0, ticks=(-2.0, 0.0, 6.0), size=7.0)
+    below.x, below.y = Axis("time (s)", low=1.0, high=100.0, log=True), Axis("two\nlines (µrad)", low=0.0, high=9.0)
+    x = np.array([1.0, 4.0, 10.0, 40.0])
+    arms = np.array([[0.5, 1.0, 2.0, 0.0], [1.0, 2.0, 4.0, 0.0]])
+    above.add(
+        Span(2.0, 8.0, True, SKY, 0.4, "a span"),
+        Line(x, np.array([0.0, np.nan, 3.0, 5.0]), BLUE, (3.0, 1.0), 1.7, "dashes", marker="D", size=5.0, every=(0, 3)),
+        Line(x, x / 10.0, VERMILION, "", label="arms", marker="s", face="", edge=BLACK, edge_width=0.7, x_arms=arms),
+        Rule(2.5, False, GREY, "-.", 0.9, "a rule"),
+        Words("here\nand there", 20.0, 1.0, VERMILION, 7.0, "end", "top", (3.0, -4.0), box=True),
+    )
+    below.add(
+        Area((np.array([[1.0, 1.0], [5.0, 1.0], [5.0, 4.0]]),), SKY, 0.6, "an area", BLACK, 0.8),
+        Area((np.array([[20.0, 2.0], [60.0, 2.0], [60.0, 7.0]]),), GREY, label="hatched", hatched=True),
+        Bars(
+            np.array([10.0, 30.0]),
+            np.array([0.0, 1.0]),
+            np.array([2.0, 8.0]),
+            np.array([4.0, 9.0]),
+            BLUE,
+            True,
+            0.7,
+            BLACK,
+            "bars",
+        ),
+        Line(x, np.array([1.0, 2.0, 8.0, 4.0]), GREY, ":", 2.0, name="unlabelled", steps=True, clip=False),
+        Line(x, 9.0 - x / 5.0, BLACK, "--", 1.1, marker="x", size=8.0, y_arms=arms / 4.0),
+        Words("at a share", 0.25, 0.75, anchor="middle", base="bottom", of_panel="xy"),
+    )
+    below.legend = Legend("upper left", title="Key", size=7.0, only=(Line(X, Y, BLUE, label="own", marker="."),))
+    return sheet
+
+
+def fields_of_both_kinds():
+    """A map of cells with words at its axes and one of levels, each with a bar, beside each other."""
+    sheet = Sheet(8.0, 3.0, widths=(2.0, 1.0))
+    cells, levels = sheet.panel(0, 0), sheet.panel(0, 1)
+    z = np.array([[1.0, 2.0, np.nan], [4.0, 8.0, 16.0]])
+    cells.add(Field(X, np.array([0.0, 1.0]), z, 1.0, 16.0, "cells (dB)", ticks=(1.0, 4.0, 16.0)))
+    cells.x, cells.y = Axis("case", ticks={0.0: "one", 1.0: "2 m", 2.0: "three"}), Axis("row", ticks={0: "a", 1: "b"})
+    cells.title = "Cells"
+    plane = np.add.outer(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0]))
+    levels.add(Field(np.array([5.0, 7.0]), X, plane, 0.0, 4.0, levels=np.array([1.0, 2.0, 3.0]), spoken="level (m)"))
+    levels.equal = True
+    return sheet
+
+
+def json_lines(plot):
+    return textwrap.wrap(json.dumps(plot, ensure_ascii=False), 100, break_long_words=False, break_on_hyphens=False)
+
+
+def test_a_picture_of_every_kind_of_mark_is_the_same_to_a_hundredth_of_a_point():
+    assert svg_of(every_kind()).split("\n") == [
+        (
+            '<svg xmlns="http://www.w3.org/2000/svg" width="576" height="480" viewBox="0 0 432 '
+            '360" font-family="system-ui, \'DejaVu Sans\', sans-serif" fill="#1b1f24" '
+            'stroke-linejoin="round">'
+        ),
+        (
+            '<defs><pattern id="hatch" width="5" height="5" patternUnits="userSpaceOnUse" '
+            'patternTransform="rotate(45)"><path d="M0 0V5" stroke="#000000" '
+            'stroke-width="1.2"/></pattern></defs>'
+        ),
+        ('<text x="429.00" y="11.55" font-size="9" text-anchor="end" fill="#777777">Head &amp; &lt;b&gt;</text>'),
+        '<rect x="39.86" y="30.60" width="380.50" height="78.91" fill="#eeeeee"/>',
+        (
+            '<path d="M54.25 30.60V109.51M112.38 30.60V109.51M170.52 30.60V109.51M228.66 '
+            '30.60V109.51M286.79 30.60V109.51M344.93 30.60V109.51M403.06 30.60V109.51" '
+            'stroke="#dddddd" stroke-width="0.6" fill="none"/>'
+        ),
+        (
+            '<path d="M39.86 109.51H420.36M39.86 89.78H420.36M39.86 30.60H420.36" '
+            'stroke="#dddddd" stroke-width="0.6" fill="none"/>'
+        ),
+        ('<svg x="39.86" y="30.60" width="380.50" height="78.91"><g transform="translate(-39.86 -30.60)">'),
+        '<rect x="65.88" y="30.60" width="34.88" height="78.91" fill="#56B4E9" fill-opacity="0.4"/>',
+        (
+            '<path d="M60.06 89.78M112.38 60.19L286.79 40.46" fill="none" stroke="#0072B2" '
+            'stroke-width="1.7" stroke-dasharray="5.1 1.7"/>'
+        ),
+        (
+            '<path d="M57.56 89.78l2.5 2.5l2.5 -2.5l-2.5 -2.5ZM284.29 40.46l2.5 2.5l2.5 '
+            '-2.5l-2.5 -2.5Z" fill="#0072B2" stroke="#0072B2" stroke-width="1"/>'
+        ),
+        (
+            '<path d="M57.16 88.80L65.88 88.80M57.16 85.80l0 6M65.88 85.80l0 6M71.69 '
+            "85.84L89.13 85.84M71.69 82.84l0 6M89.13 82.84l0 6M100.76 79.92L135.64 "
+            '79.92M100.76 76.92l0 6M135.64 76.92l0 6" fill="none" stroke="#D55E00" '
+            'stroke-width="1"/>'
+        ),
+        (
+            '<path d="M57.06 85.80h6v6h-6ZM74.50 82.84h6v6h-6ZM109.38 76.92h6v6h-6ZM283.79 '
+            '47.33h6v6h-6Z" fill="none" stroke="#000000" stroke-width="0.7"/>'
+        ),
+        (
+            '<path d="M39.86 65.12H420.36" fill="none" stroke="#777777" stroke-width="0.9" '
+            'stroke-dasharray="5.76 1.44 0.9 1.44"/>'
+        ),
+        "</g></svg>",
+        (
+            '<path d="M39.86 30.60V109.51H420.36V30.60ZM54.25 109.51v3.5M112.38 '
+            "109.51v3.5M170.52 109.51v3.5M228.66 109.51v3.5M286.79 109.51v3.5M344.93 "
+            '109.51v3.5M403.06 109.51v3.5M39.86 109.51h-3.5M39.86 89.78h-3.5M39.86 30.60h-3.5" '
+            'stroke="#1b1f24" stroke-width="0.8" fill="none"/>'
+        ),
+        '<text x="33.36" y="111.96" font-size="7" text-anchor="end">−2</text>',
+        '<text x="33.36" y="92.23" font-size="7" text-anchor="end">0</text>',
+        '<text x="33.36" y="33.05" font-size="7" text-anchor="end">6</text>',
+        (
+            '<text x="15.86" y="73.21" font-size="9" text-anchor="middle" '
+            'transform="rotate(-90 15.86 70.06)">gain (dB)</text>'
+        ),
+        '<text x="39.86" y="25.35" font-size="9">First</text>',
+        ('<rect x="139.50" y="83.92" width="34.02" height="16.80" fill="#ffffff" fill-opacity="0.75"/>'),
+        (
+            '<text x="173.52" y="90.57" font-size="7" text-anchor="end" fill="#D55E00"><tspan '
+            'x="173.52" y="90.57">here</tspan><tspan x="173.52" y="98.97">and '
+            "there</tspan></text>"
+        ),
+        (
+            '<path d="M39.86 117.91V275.74M230.11 117.91V275.74M420.36 117.91V275.74" '
+            'stroke="#dddddd" stroke-width="0.6" fill="none"/>'
+        ),
+        (
+            '<path d="M39.86 275.74H420.36M39.86 240.67H420.36M39.86 205.59H420.36M39.86 '
+            '170.52H420.36M39.86 135.45H420.36" stroke="#dddddd" stroke-width="0.6" '
+            'fill="none"/>'
+        ),
+        ('<svg x="39.86" y="117.91" width="380.50" height="157.83"><g transform="translate(-39.86 -117.91)">'),
+        (
+            '<path d="M39.86 258.2L172.84 258.2L172.84 205.59Z" fill="#56B4E9" '
+            'fill-opacity="0.6" fill-rule="evenodd" stroke="#000000" stroke-width="0.8"/>'
+        ),
+        (
+            '<path d="M287.38 240.67L378.15 240.67L378.15 152.99Z" fill="url(#hatch)" '
+            'fill-opacity="1" fill-rule="evenodd"/>'
+        ),
+        (
+            '<path d="M211.67 275.74H245.17V240.67H211.67ZM307.45 '
+            '258.20H332.43V135.45H307.45Z" fill="#0072B2" fill-opacity="0.7" stroke="#000000" '
+            'stroke-width="0.5"/>'
+        ),
+        (
+            '<path d="M39.86 121.42L154.4 131.94L230.11 152.99L344.65 258.2" fill="none" '
+            'stroke="#000000" stroke-width="1.1" stroke-dasharray="4.07 1.76"/>'
+        ),
+        (
+            '<path d="M39.86 123.61L39.86 117.04M36.86 123.61l6 0M36.86 117.04l6 0M154.40 '
+            "136.33L154.40 123.17M151.40 136.33l6 0M151.40 123.17l6 0M230.11 161.75L230.11 "
+            '135.45M227.11 161.75l6 0M227.11 135.45l6 0" fill="none" stroke="#000000" '
+            'stroke-width="1"/>'
+        ),
+        (
+            '<path d="M35.86 117.42l8 8m0 -8l-8 8M150.40 127.94l8 8m0 -8l-8 8M226.11 148.99l8 '
+            '8m0 -8l-8 8M340.65 254.20l8 8m0 -8l-8 8" fill="none" stroke="#000000" '
+            'stroke-width="1"/>'
+        ),
+        "</g></svg>",
+        (
+            '<path d="M39.86 117.91V275.74H420.36M39.86 275.74v3.5M230.11 275.74v3.5M420.36 '
+            "275.74v3.5M39.86 275.74h-3.5M39.86 240.67h-3.5M39.86 205.59h-3.5M39.86 "
+            "170.52h-3.5M39.86 135.45h-3.5M39.86 275.74v2M97.13 275.74v2M130.63 "
+            "275.74v2M154.40 275.74v2M172.84 275.74v2M187.90 275.74v2M200.64 275.74v2M211.67 "
+            "275.74v2M221.40 275.74v2M230.11 275.74v2M287.38 275.74v2M320.88 275.74v2M344.65 "
+            "275.74v2M363.09 275.74v2M378.15 275.74v2M390.89 275.74v2M401.92 275.74v2M411.65 "
+            '275.74v2M420.36 275.74v2" stroke="#1b1f24" stroke-width="0.8" fill="none"/>'
+        ),
+        '<text x="39.86" y="290.79" font-size="9" text-anchor="middle">1</text>',
+        '<text x="230.11" y="290.79" font-size="9" text-anchor="middle">10</text>',
+        '<text x="420.36" y="290.79" font-size="9" text-anchor="middle">100</text>',
+        '<text x="33.36" y="278.89" font-size="9" text-anchor="end">0</text>',
+        '<text x="33.36" y="243.82" font-size="9" text-anchor="end">2</text>',
+        '<text x="33.36" y="208.74" font-size="9" text-anchor="end">4</text>',
+        '<text x="33.36" y="173.67" font-size="9" text-anchor="end">6</text>',
+        '<text x="33.36" y="138.60" font-size="9" text-anchor="end">8</text>',
+        '<text x="230.11" y="304.59" font-size="9" text-anchor="middle">time (s)</text>',
+        (
+            '<text x="13.80" y="194.58" font-size="9" text-anchor="middle" '
+            'transform="rotate(-90 13.80 196.83)"><tspan x="13.80" '
+            'y="194.58">two</tspan><tspan x="13.80" y="205.38">lines (µrad)</tspan></text>'
+        ),
+        (
+            '<path d="M39.86 258.2L154.4 258.2L154.4 240.67L230.11 240.67L230.11 135.45L344.65 '
+            '135.45L344.65 205.59" fill="none" stroke="#777777" stroke-width="2" '
+            'stroke-dasharray="2 3.3"/>'
+        ),
+        '<text x="134.99" y="155.37" font-size="8" text-anchor="middle">at a share</text>',
+        '<text x="45.86" y="127.56" font-size="7">Key</text>',
+        '<path d="M45.86 135.40h20" fill="none" stroke="#0072B2" stroke-width="1.3"/>',
+        (
+            '<path d="M54.11 135.40a1.75 1.75 0 1 0 3.5 0a1.75 1.75 0 1 0 -3.5 0Z" '
+            'fill="#0072B2" stroke="#0072B2" stroke-width="0"/>'
+        ),
+        '<text x="70.86" y="137.85" font-size="7">own</text>',
+        ('<rect x="153.64" y="315.16" width="20.00" height="6.40" fill="#56B4E9" fill-opacity="0.4"/>'),
+        '<text x="178.64" y="321.16" font-size="8">a span</text>',
+        ('<path d="M153.64 329.40h20" fill="none" stroke="#0072B2" stroke-width="1.7" stroke-dasharray="5.1 1.7"/>'),
+        ('<path d="M161.14 329.40l2.5 2.5l2.5 -2.5l-2.5 -2.5Z" fill="#0072B2" stroke="#0072B2" stroke-width="1"/>'),
+        '<text x="178.64" y="332.20" font-size="8">dashes</text>',
+        '<path d="M160.64 337.44h6v6h-6Z" fill="none" stroke="#000000" stroke-width="0.7"/>',
+        '<text x="178.64" y="343.24" font-size="8">arms</text>',
+        (
+            '<path d="M153.64 351.48h20" fill="none" stroke="#777777" stroke-width="0.9" '
+            'stroke-dasharray="5.76 1.44 0.9 1.44"/>'
+        ),
+        '<text x="178.64" y="354.28" font-size="8">a rule</text>',
+        (
+            '<rect x="220.88" y="315.16" width="20.00" height="6.40" fill="#56B4E9" '
+            'fill-opacity="0.6" stroke="#000000" stroke-width="0.5"/>'
+        ),
+        '<text x="245.88" y="321.16" font-size="8">an area</text>',
+        '<rect x="220.88" y="326.20" width="20.00" height="6.40" fill="#777777" fill-opacity="1"/>',
+        '<text x="245.88" y="332.20" font-size="8">hatched</text>',
+        (
+            '<rect x="220.88" y="337.24" width="20.00" height="6.40" fill="#0072B2" '
+            'fill-opacity="0.7" stroke="#000000" stroke-width="0.5"/>'
+        ),
+        '<text x="245.88" y="343.24" font-size="8">bars</text>',
+        "</svg>",
+        "",
+    ]
+
+
+def test_the_interactive_form_of_every_kind_of_mark_has_each_of_its_fields():
+    assert json_lines(plot_of(every_kind())) == [
+        ('{"size": [576.0, 480.0], "keys": [{"title": "Key", "entries": [{"label": "own", "line": {"color":'),
+        ('"#0072B2", "width": 1.73, "dash": "solid"}, "marker": {"symbol": "circle", "size": 4.67, "color":'),
+        ('"#0072B2"}, "data": [], "shapes": []}]}, {"title": "", "entries": [{"label": "a span", "area":'),
+        ('"rgba(86,180,233,0.4)", "data": [], "shapes": [0]}, {"label": "dashes", "line": {"color": "#0072B2",'),
+        ('"width": 2.27, "dash": "6.8px,2.27px"}, "marker": {"symbol": "diamond", "size": 6.67, "color":'),
+        ('"#0072B2", "line": {"color": "#0072B2", "width": 1.33}}, "data": [0, 1], "shapes": []}, {"label":'),
+        ('"arms", "marker": {"symbol": "square-open", "size": 8.0, "color": "#000000", "line": {"color":'),
+        ('"#000000", "width": 0.93}}, "data": [2], "shapes": []}, {"label": "a rule", "line": {"color":'),
+        ('"#777777", "width": 1.2, "dash": "dashdot"}, "data": [], "shapes": [1]}, {"label": "an area",'),
+        ('"area": "rgba(86,180,233,0.6)", "data": [], "shapes": [3]}, {"label": "hatched", "area": "#777777",'),
+        ('"data": [3], "shapes": []}, {"label": "bars", "area": "rgba(0,114,178,0.7)", "data": [4], "shapes":'),
+        ('[]}]}], "data": [{"xaxis": "x", "yaxis": "y", "name": "dashes", "type": "scatter", "mode": "lines",'),
+        ('"x": [1, 4, 10, 40], "y": [0, null, 3, 5], "hovertemplate": "time: %{x:.5~g} s<br>gain: %{y:.5~g}'),
+        'dB<extra>%{fullData.name}</extra>", "line": {"color": "#0072B2", "width": 2.27, "dash":',
+        ('"6.8px,2.27px", "shape": "linear", "simplify": false}}, {"xaxis": "x", "yaxis": "y", "name":'),
+        ('"dashes", "type": "scatter", "mode": "markers", "x": [1, 40], "y": [0, 5], "hovertemplate": null,'),
+        ('"marker": {"symbol": "diamond", "size": 6.67, "color": "#0072B2", "line": {"color": "#0072B2",'),
+        ('"width": 1.33}}, "hoverinfo": "skip"}, {"xaxis": "x", "yaxis": "y", "name": "arms", "type":'),
+        ('"scatter", "mode": "markers", "x": [1, 4, 10, 40], "y": [0.1, 0.4, 1, 4], "hovertemplate": "time:'),
+        '%{x:.5~g} s<br>gain: %{y:.5~g} dB<extra>%{fullData.name}</extra>", "marker": {"symbol":',
+        ('"square-open", "size": 8.0, "color": "#000000", "line": {"color": "#000000", "width": 0.93}},'),
+        ('"error_x": {"type": "data", "symmetric": false, "arrayminus": [0.5, 1, 2, 0], "array": [1, 2, 4, 0],'),
+        '"color": "#D55E00", "thickness": 1.3, "width": 4}}, {"xaxis": "x2", "yaxis": "y2", "name":',
+        ('"hatched", "type": "scatter", "mode": "lines", "x": [20, 60, 60], "y": [2, 2, 7], "fill": "toself",'),
+        ('"fillpattern": {"shape": "/", "size": 6, "solidity": 0.15, "fgcolor": "#000000", "bgcolor":'),
+        ('"rgba(0,0,0,0)"}, "line": {"width": 0, "color": "#000000"}, "hoverinfo": "skip"}, {"xaxis": "x2",'),
+        ('"yaxis": "y2", "name": "bars", "type": "bar", "orientation": "v", "y": [2, 7], "x": [10, 30],'),
+        ('"width": [4, 9], "base": [0, 1], "marker": {"color": "rgba(0,114,178,0.7)", "line": {"width": 0.5,'),
+        ('"color": "#000000"}}, "hovertext": ["time: 8 to 12 s<br>two lines: 2 µrad", "time: 25.5 to 34.5'),
+        ('s<br>two lines: 1 to 8 µrad"], "hovertemplate": "%{hovertext}<extra>%{fullData.name}</extra>"},'),
+        ('{"xaxis": "x2", "yaxis": "y2", "name": "unlabelled", "type": "scatter", "mode": "lines", "x": [1, 4,'),
+        '10, 40], "y": [1, 2, 8, 4], "hovertemplate": "time: %{x:.5~g} s<br>two lines: %{y:.5~g}',
+        ('µrad<extra>%{fullData.name}</extra>", "line": {"color": "#777777", "width": 2.67, "dash": "dot",'),
+        ('"shape": "hv", "simplify": false}, "cliponaxis": false}, {"xaxis": "x2", "yaxis": "y2", "name": "",'),
+        '"type": "scatter", "mode": "lines+markers", "x": [1, 4, 10, 40], "y": [8.8, 8.2, 7, 1],',
+        ('"hovertemplate": "time: %{x:.5~g} s<br>two lines: %{y:.5~g} µrad<extra>%{fullData.name}</extra>",'),
+        ('"line": {"color": "#000000", "width": 1.47, "dash": "dash", "shape": "linear", "simplify": false},'),
+        ('"marker": {"symbol": "x-thin-open", "size": 10.67, "color": "#000000", "line": {"color": "#000000",'),
+        ('"width": 1.33}}, "error_y": {"type": "data", "symmetric": false, "arrayminus": [0.125, 0.25, 0.5,'),
+        ('0], "array": [0.25, 0.5, 1, 0], "color": "#000000", "thickness": 1.3, "width": 4}}], "layout":'),
+        '{"font": {"size": 12, "color": "#1b1f24", "family": "system-ui, DejaVu Sans, sans-serif"},',
+        ('"hoverlabel": {"align": "left", "namelength": -1}, "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor":'),
+        ('"rgba(0,0,0,0)", "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "showlegend": false, "hovermode":'),
+        ('"closest", "dragmode": "zoom", "barmode": "overlay", "xaxis": {"type": "linear", "range": [-2.475,'),
+        '62.975], "anchor": "y", "showticklabels": false, "ticks": "outside", "ticklen": 4,',
+        ('"ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor": "#1b1f24", "showgrid": true,'),
+        '"mirror": true, "showline": true, "zeroline": false, "title": {"text": "", "standoff": 5},',
+        ('"tickfont": {"size": 12.0}, "exponentformat": "power", "minexponent": 5}, "yaxis": {"type":'),
+        ('"linear", "range": [-2, 6], "anchor": "x", "showticklabels": true, "ticks": "outside", "ticklen": 4,'),
+        ('"ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor": "#1b1f24", "showgrid": true,'),
+        ('"mirror": true, "showline": true, "zeroline": false, "title": {"text": "gain (dB)", "standoff": 5},'),
+        ('"tickfont": {"size": 9.33}, "exponentformat": "power", "minexponent": 5}, "xaxis2": {"type": "log",'),
+        '"range": [0, 2], "anchor": "y2", "showticklabels": true, "ticks": "outside", "ticklen": 4,',
+        ('"ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor": "#1b1f24", "showgrid": true,'),
+        ('"mirror": false, "showline": true, "zeroline": false, "title": {"text": "time (s)", "standoff": 5},'),
+        ('"tickfont": {"size": 12.0}, "nticks": 5, "tickformat": "~g", "matches": "x"}, "yaxis2": {"type":'),
+        ('"linear", "range": [0, 9], "anchor": "x2", "showticklabels": true, "ticks": "outside", "ticklen": 4,'),
+        ('"ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor": "#1b1f24", "showgrid": true,'),
+        ('"mirror": false, "showline": true, "zeroline": false, "title": {"text": "two<br>lines (µrad)",'),
+        ('"standoff": 5}, "tickfont": {"size": 12.0}, "exponentformat": "power", "minexponent": 5}, "shapes":'),
+        ('[{"type": "rect", "layer": "below", "x0": 2, "x1": 8, "xref": "x", "y0": 0, "y1": 1, "yref": "y'),
+        ('domain", "fillcolor": "rgba(86,180,233,0.4)", "line": {"width": 0}}, {"type": "line", "layer":'),
+        ('"above", "x0": 0, "x1": 1, "xref": "x domain", "y0": 2.5, "y1": 2.5, "yref": "y", "line": {"color":'),
+        ('"#777777", "width": 1.2, "dash": "dashdot"}}, {"type": "rect", "x0": 0, "x1": 1, "y0": 0, "y1": 1,'),
+        ('"layer": "below", "line": {"width": 0}, "xref": "x domain", "yref": "y domain", "fillcolor":'),
+        ('"#eeeeee"}, {"type": "path", "path": "M1,1L5,1L5,4Z", "fillrule": "evenodd", "xref": "x2", "yref":'),
+        ('"y2", "layer": "between", "fillcolor": "rgba(86,180,233,0.6)", "line": {"color": "#000000", "width":'),
+        ('1.07}}], "annotations": [{"text": "here<br>and there", "showarrow": false, "borderpad": 0, "font":'),
+        ('{"size": 9.33, "color": "#D55E00"}, "x": 20, "xref": "x", "xshift": 4.0, "y": 1, "yref": "y",'),
+        ('"yshift": -5.33, "xanchor": "right", "yanchor": "top", "bgcolor": "rgba(255,255,255,0.75)"},'),
+        ('{"text": "First", "xref": "x domain", "yref": "y domain", "x": 0, "y": 1, "yshift": 3, "xanchor":'),
+        ('"left", "yanchor": "bottom", "showarrow": false, "font": {"size": 12}}, {"text": "at a share",'),
+        ('"showarrow": false, "borderpad": 0, "font": {"size": 10.67, "color": "#000000"}, "x": 0.25, "xref":'),
+        ('"x2 domain", "xshift": 0.0, "y": 0.75, "yref": "y2 domain", "yshift": 0.0, "xanchor": "center",'),
+        ('"yanchor": "bottom"}]}, "panels": [{"x": "xaxis", "y": "yaxis", "inner": [53.1, 40.8, 560.5, 146.0],'),
+        ('"outer": [13.9, 22.4, 568.5, 150.0], "titles": {"xaxis": "time (s)", "yaxis": "gain (dB)"}}, {"x":'),
+        ('"xaxis2", "y": "yaxis2", "inner": [53.1, 157.2, 560.5, 367.7], "outer": [4.0, 150.0, 572.0, 409.1],'),
+        ('"titles": {"xaxis2": "time (s)", "yaxis2": "two<br>lines (µrad)"}}], "scales": [], "heading":'),
+        '[{"text": "Head & <b>", "color": "#777777"}], "ratio": false}',
+    ]
+
+
+def test_pictures_of_fields_have_each_cell_level_bar_and_word():
+    assert svg_of(fields_of_both_kinds()).split("\n") == [
+        (
+            '<svg xmlns="http://www.w3.org/2000/svg" width="768" height="288" viewBox="0 0 576 '
+            '216" font-family="system-ui, \'DejaVu Sans\', sans-serif" fill="#1b1f24" '
+            'stroke-linejoin="round">'
+        ),
+        (
+            '<path d="M80.34 16.80V181.90M183.07 16.80V181.90M285.81 16.80V181.90" '
+            'stroke="#dddddd" stroke-width="0.6" fill="none"/>'
+        ),
+        ('<path d="M28.97 140.62H337.18M28.97 58.08H337.18" stroke="#dddddd" stroke-width="0.6" fill="none"/>'),
+        ('<svg x="28.97" y="16.80" width="308.21" height="165.10"><g transform="translate(-28.97 -16.80)">'),
+        (
+            '<rect x="28.97" y="99.35" width="102.74" height="82.55" fill="#00224e" '
+            'stroke="#00224e" stroke-width="0.6"/>'
+        ),
+        (
+            '<rect x="131.71" y="99.35" width="102.74" height="82.55" fill="#022f6a" '
+            'stroke="#022f6a" stroke-width="0.6"/>'
+        ),
+        (
+            '<rect x="28.97" y="16.80" width="102.74" height="82.55" fill="#35456d" '
+            'stroke="#35456d" stroke-width="0.6"/>'
+        ),
+        (
+            '<rect x="131.71" y="16.80" width="102.74" height="82.55" fill="#767675" '
+            'stroke="#767675" stroke-width="0.6"/>'
+        ),
+        (
+            '<rect x="234.44" y="16.80" width="102.74" height="82.55" fill="#fee838" '
+            'stroke="#fee838" stroke-width="0.6"/>'
+        ),
+        "</g></svg>",
+        (
+            '<path d="M28.97 16.80V181.90H337.18M80.34 181.90v3.5M183.07 181.90v3.5M285.81 '
+            '181.90v3.5M28.97 140.62h-3.5M28.97 58.08h-3.5" stroke="#1b1f24" '
+            'stroke-width="0.8" fill="none"/>'
+        ),
+        '<text x="80.34" y="196.95" font-size="9" text-anchor="middle">one</text>',
+        '<text x="183.07" y="196.95" font-size="9" text-anchor="middle">2 m</text>',
+        '<text x="285.81" y="196.95" font-size="9" text-anchor="middle">three</text>',
+        '<text x="22.47" y="143.78" font-size="9" text-anchor="end">a</text>',
+        '<text x="22.47" y="61.23" font-size="9" text-anchor="end">b</text>',
+        '<text x="183.07" y="210.75" font-size="9" text-anchor="middle">case</text>',
+        ('<text x="8.40" y="102.50" font-size="9" text-anchor="middle" transform="rotate(-90 8.40 99.35)">row</text>'),
+        '<text x="28.97" y="11.55" font-size="9">Cells</text>',
+        '<rect x="346.18" y="179.32" width="11.00" height="2.88" fill="#002452"/>',
+        '<rect x="346.18" y="176.74" width="11.00" height="2.88" fill="#002658"/>',
+        '<rect x="346.18" y="174.16" width="11.00" height="2.88" fill="#002a60"/>',
+        '<rect x="346.18" y="171.58" width="11.00" height="2.88" fill="#002c66"/>',
+        '<rect x="346.18" y="169.00" width="11.00" height="2.88" fill="#032f6b"/>',
+        '<rect x="346.18" y="166.42" width="11.00" height="2.88" fill="#0a326c"/>',
+        '<rect x="346.18" y="163.84" width="11.00" height="2.88" fill="#10346d"/>',
+        '<rect x="346.18" y="161.26" width="11.00" height="2.88" fill="#17376e"/>',
+        '<rect x="346.18" y="158.68" width="11.00" height="2.88" fill="#1d396f"/>',
+        '<rect x="346.18" y="156.10" width="11.00" height="2.88" fill="#233c6e"/>',
+        '<rect x="346.18" y="153.52" width="11.00" height="2.88" fill="#293f6e"/>',
+        '<rect x="346.18" y="150.94" width="11.00" height="2.88" fill="#2f426d"/>',
+        '<rect x="346.18" y="148.36" width="11.00" height="2.88" fill="#34446d"/>',
+        '<rect x="346.18" y="145.78" width="11.00" height="2.88" fill="#38476d"/>',
+        '<rect x="346.18" y="143.20" width="11.00" height="2.88" fill="#3d4a6c"/>',
+        '<rect x="346.18" y="140.62" width="11.00" height="2.88" fill="#414d6c"/>',
+        '<rect x="346.18" y="138.05" width="11.00" height="2.88" fill="#45506c"/>',
+        '<rect x="346.18" y="135.47" width="11.00" height="2.88" fill="#49526c"/>',
+        '<rect x="346.18" y="132.89" width="11.00" height="2.88" fill="#4d566d"/>',
+        '<rect x="346.18" y="130.31" width="11.00" height="2.88" fill="#51586d"/>',
+        '<rect x="346.18" y="127.73" width="11.00" height="2.88" fill="#555b6d"/>',
+        '<rect x="346.18" y="125.15" width="11.00" height="2.88" fill="#585e6e"/>',
+        '<rect x="346.18" y="122.57" width="11.00" height="2.88" fill="#5c616e"/>',
+        '<rect x="346.18" y="119.99" width="11.00" height="2.88" fill="#5f646f"/>',
+        '<rect x="346.18" y="117.41" width="11.00" height="2.88" fill="#636670"/>',
+        '<rect x="346.18" y="114.83" width="11.00" height="2.88" fill="#666970"/>',
+        '<rect x="346.18" y="112.25" width="11.00" height="2.88" fill="#6a6c72"/>',
+        '<rect x="346.18" y="109.67" width="11.00" height="2.88" fill="#6d6f72"/>',
+        '<rect x="346.18" y="107.09" width="11.00" height="2.88" fill="#717274"/>',
+        '<rect x="346.18" y="104.51" width="11.00" height="2.88" fill="#747475"/>',
+        '<rect x="346.18" y="101.93" width="11.00" height="2.88" fill="#787876"/>',
+        '<rect x="346.18" y="99.35" width="11.00" height="2.88" fill="#7b7a77"/>',
+        '<rect x="346.18" y="96.77" width="11.00" height="2.88" fill="#7f7e78"/>',
+        '<rect x="346.18" y="94.19" width="11.00" height="2.88" fill="#838078"/>',
+        '<rect x="346.18" y="91.61" width="11.00" height="2.88" fill="#868478"/>',
+        '<rect x="346.18" y="89.03" width="11.00" height="2.88" fill="#8a8678"/>',
+        '<rect x="346.18" y="86.45" width="11.00" height="2.88" fill="#8e8a78"/>',
+        '<rect x="346.18" y="83.87" width="11.00" height="2.88" fill="#928c77"/>',
+        '<rect x="346.18" y="81.29" width="11.00" height="2.88" fill="#959077"/>',
+        '<rect x="346.18" y="78.71" width="11.00" height="2.88" fill="#999276"/>',
+        '<rect x="346.18" y="76.13" width="11.00" height="2.88" fill="#9d9676"/>',
+        '<rect x="346.18" y="73.55" width="11.00" height="2.88" fill="#a19874"/>',
+        '<rect x="346.18" y="70.97" width="11.00" height="2.88" fill="#a59c74"/>',
+        '<rect x="346.18" y="68.39" width="11.00" height="2.88" fill="#a99e72"/>',
+        '<rect x="346.18" y="65.81" width="11.00" height="2.88" fill="#ada271"/>',
+        '<rect x="346.18" y="63.23" width="11.00" height="2.88" fill="#b1a570"/>',
+        '<rect x="346.18" y="60.65" width="11.00" height="2.88" fill="#b6a96e"/>',
+        '<rect x="346.18" y="58.08" width="11.00" height="2.88" fill="#baac6d"/>',
+        '<rect x="346.18" y="55.50" width="11.00" height="2.88" fill="#beb06b"/>',
+        '<rect x="346.18" y="52.92" width="11.00" height="2.88" fill="#c2b369"/>',
+        '<rect x="346.18" y="50.34" width="11.00" height="2.88" fill="#c7b666"/>',
+        '<rect x="346.18" y="47.76" width="11.00" height="2.88" fill="#cbb964"/>',
+        '<rect x="346.18" y="45.18" width="11.00" height="2.88" fill="#cfbd62"/>',
+        '<rect x="346.18" y="42.60" width="11.00" height="2.88" fill="#d3c05f"/>',
+        '<rect x="346.18" y="40.02" width="11.00" height="2.88" fill="#d8c45c"/>',
+        '<rect x="346.18" y="37.44" width="11.00" height="2.88" fill="#dcc759"/>',
+        '<rect x="346.18" y="34.86" width="11.00" height="2.88" fill="#e0cb56"/>',
+        '<rect x="346.18" y="32.28" width="11.00" height="2.88" fill="#e5cf51"/>',
+        '<rect x="346.18" y="29.70" width="11.00" height="2.88" fill="#e9d24d"/>',
+        '<rect x="346.18" y="27.12" width="11.00" height="2.88" fill="#eed648"/>',
+        '<rect x="346.18" y="24.54" width="11.00" height="2.88" fill="#f2da44"/>',
+        '<rect x="346.18" y="21.96" width="11.00" height="2.88" fill="#f5de41"/>',
+        '<rect x="346.18" y="19.38" width="11.00" height="2.88" fill="#f9e23d"/>',
+        '<rect x="346.18" y="16.80" width="11.00" height="2.88" fill="#fce63a"/>',
+        '<path d="M357.18 181.90h3.5" stroke="#1b1f24" stroke-width="0.8"/>',
+        '<text x="363.68" y="185.05" font-size="9">1</text>',
+        '<path d="M357.18 148.88h3.5" stroke="#1b1f24" stroke-width="0.8"/>',
+        '<text x="363.68" y="152.03" font-size="9">4</text>',
+        '<path d="M357.18 16.80h3.5" stroke="#1b1f24" stroke-width="0.8"/>',
+        '<text x="363.68" y="19.95" font-size="9">16</text>',
+        (
+            '<text x="383.60" y="102.50" font-size="9" text-anchor="middle" '
+            'transform="rotate(-90 383.60 99.35)">cells (dB)</text>'
+        ),
+        (
+            '<path d="M412.90 22.30V176.40M489.95 22.30V176.40M567.00 22.30V176.40" '
+            'stroke="#dddddd" stroke-width="0.6" fill="none"/>'
+        ),
+        (
+            '<path d="M412.90 176.40H567.00M412.90 137.88H567.00M412.90 99.35H567.00M412.90 '
+            '60.82H567.00M412.90 22.30H567.00" stroke="#dddddd" stroke-width="0.6" '
+            'fill="none"/>'
+        ),
+        ('<svg x="412.90" y="22.30" width="154.10" height="154.10"><g transform="translate(-412.90 -22.30)">'),
+        (
+            '<path d="M412.9 176.4L489.95 176.4L412.9 99.35L412.9 99.35L412.9 99.35L412.9 '
+            '176.4Z" fill="#1a386f" fill-rule="evenodd" stroke="#1a386f" stroke-width="0.4"/>'
+        ),
+        (
+            '<path d="M489.95 176.4L567 176.4L567 176.4L489.95 99.35L412.9 22.3L412.9 '
+            '22.3L412.9 99.35L412.9 99.35L489.95 176.4Z" fill="#61656f" fill-rule="evenodd" '
+            'stroke="#61656f" stroke-width="0.4"/>'
+        ),
+        (
+            '<path d="M489.95 99.35L567 176.4L567 99.35L567 99.35L489.95 22.3L412.9 '
+            '22.3L489.95 99.35Z" fill="#9b9476" fill-rule="evenodd" stroke="#9b9476" '
+            'stroke-width="0.4"/>'
+        ),
+        (
+            '<path d="M489.95 22.3L567 99.35L567 22.3L489.95 22.3Z" fill="#dec958" '
+            'fill-rule="evenodd" stroke="#dec958" stroke-width="0.4"/>'
+        ),
+        "</g></svg>",
+        (
+            '<path d="M412.90 22.30V176.40H567.00M412.90 176.40v3.5M489.95 176.40v3.5M567.00 '
+            "176.40v3.5M412.90 176.40h-3.5M412.90 137.88h-3.5M412.90 99.35h-3.5M412.90 "
+            '60.82h-3.5M412.90 22.30h-3.5" stroke="#1b1f24" stroke-width="0.8" fill="none"/>'
+        ),
+        '<text x="412.90" y="191.45" font-size="9" text-anchor="middle">5</text>',
+        '<text x="489.95" y="191.45" font-size="9" text-anchor="middle">6</text>',
+        '<text x="567.00" y="191.45" font-size="9" text-anchor="middle">7</text>',
+        '<text x="406.40" y="179.55" font-size="9" text-anchor="end">0</text>',
+        '<text x="406.40" y="141.03" font-size="9" text-anchor="end">0.5</text>',
+        '<text x="406.40" y="102.50" font-size="9" text-anchor="end">1.0</text>',
+        '<text x="406.40" y="63.97" font-size="9" text-anchor="end">1.5</text>',
+        '<text x="406.40" y="25.45" font-size="9" text-anchor="end">2.0</text>',
+        "</svg>",
+        "",
+    ]
+
+
+def test_the_interactive_form_of_fields_has_each_cell_level_bar_and_word():
+    assert json_lines(plot_of(fields_of_both_kinds())) == [
+        ('{"size": [768.0, 288.0], "keys": [], "data": [{"xaxis": "x", "yaxis": "y", "name": "", "type":'),
+        ('"heatmap", "z": [[1, 2, null], [4, 8, 16]], "x": [0, 1, 2], "y": [0, 1], "colorscale": [[0.0,'),
+        ('"#00224e"], [0.0625, "#002e6a"], [0.125, "#1a386f"], [0.1875, "#32436d"], [0.25, "#434e6c"],'),
+        ('[0.3125, "#535a6d"], [0.375, "#61656f"], [0.4375, "#6f7073"], [0.5, "#7d7c78"], [0.5625, "#8c8878"],'),
+        ('[0.625, "#9b9476"], [0.6875, "#aba072"], [0.75, "#bcae6c"], [0.8125, "#cdbb63"], [0.875, "#dec958"],'),
+        ('[0.9375, "#f0d846"], [1.0, "#fee838"]], "zauto": false, "showscale": true, "zmin": 1, "zmax": 16,'),
+        '"hovertemplate": "%{text}<br>cells: %{z:.5~g} dB<extra>%{fullData.name}</extra>", "text":',
+        ('[["a<br>one", "a<br>case: 2 m", "a<br>three"], ["b<br>one", "b<br>case: 2 m", "b<br>three"]],'),
+        '"colorbar": {"title": {"text": "cells (dB)", "side": "right"}, "tickvals": [1, 4, 16],',
+        ('"outlinewidth": 0}}, {"xaxis": "x2", "yaxis": "y2", "name": "", "type": "contour", "z": [[0, 2], [1,'),
+        ('3], [2, 4]], "x": [5, 7], "y": [0, 1, 2], "colorscale": [[0.0, "#00224e"], [0.0625, "#002e6a"],'),
+        ('[0.125, "#1a386f"], [0.1875, "#32436d"], [0.25, "#434e6c"], [0.3125, "#535a6d"], [0.375, "#61656f"],'),
+        ('[0.4375, "#6f7073"], [0.5, "#7d7c78"], [0.5625, "#8c8878"], [0.625, "#9b9476"], [0.6875, "#aba072"],'),
+        ('[0.75, "#bcae6c"], [0.8125, "#cdbb63"], [0.875, "#dec958"], [0.9375, "#f0d846"], [1.0, "#fee838"]],'),
+        ('"zauto": false, "showscale": false, "zmin": 0, "zmax": 4, "hovertemplate": "x: %{x:.5~g}<br>y:'),
+        ('%{y:.5~g}<br>level: %{z:.5~g} m<extra>%{fullData.name}</extra>", "line": {"width": 0}, "contours":'),
+        ('{"start": 1.0, "end": 3.0, "size": 1.0, "coloring": "fill"}}], "layout": {"font": {"size": 12,'),
+        ('"color": "#1b1f24", "family": "system-ui, DejaVu Sans, sans-serif"}, "hoverlabel": {"align": "left",'),
+        ('"namelength": -1}, "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)", "margin":'),
+        ('{"l": 0, "r": 0, "t": 0, "b": 0}, "showlegend": false, "hovermode": "closest", "dragmode": "zoom",'),
+        '"barmode": "overlay", "xaxis": {"type": "linear", "range": [-0.5, 2.5], "anchor": "y",',
+        ('"showticklabels": true, "ticks": "outside", "ticklen": 4, "ticklabeloverflow": "allow", "gridcolor":'),
+        ('"#dddddd", "linecolor": "#1b1f24", "showgrid": true, "mirror": false, "showline": true, "zeroline":'),
+        ('false, "title": {"text": "case", "standoff": 5}, "tickfont": {"size": 12.0}, "tickmode": "array",'),
+        ('"tickvals": [0, 1, 2], "ticktext": ["one", "2 m", "three"]}, "yaxis": {"type": "linear", "range":'),
+        '[-0.5, 1.5], "anchor": "x", "showticklabels": true, "ticks": "outside", "ticklen": 4,',
+        ('"ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor": "#1b1f24", "showgrid": true,'),
+        ('"mirror": false, "showline": true, "zeroline": false, "title": {"text": "row", "standoff": 5},'),
+        ('"tickfont": {"size": 12.0}, "tickmode": "array", "tickvals": [0, 1], "ticktext": ["a", "b"]},'),
+        ('"xaxis2": {"type": "linear", "range": [5, 7], "anchor": "y2", "showticklabels": true, "ticks":'),
+        ('"outside", "ticklen": 4, "ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor":'),
+        ('"#1b1f24", "showgrid": true, "mirror": false, "showline": true, "zeroline": false, "title": {"text":'),
+        ('"", "standoff": 5}, "tickfont": {"size": 12.0}, "exponentformat": "power", "minexponent": 5},'),
+        ('"yaxis2": {"type": "linear", "range": [0, 2], "anchor": "x2", "showticklabels": true, "ticks":'),
+        ('"outside", "ticklen": 4, "ticklabeloverflow": "allow", "gridcolor": "#dddddd", "linecolor":'),
+        ('"#1b1f24", "showgrid": true, "mirror": false, "showline": true, "zeroline": false, "title": {"text":'),
+        ('"", "standoff": 5}, "tickfont": {"size": 12.0}, "exponentformat": "power", "minexponent": 5,'),
+        ('"scaleanchor": "x2", "scaleratio": 1.0}, "shapes": [], "annotations": [{"text": "Cells", "xref": "x'),
+        ('domain", "yref": "y domain", "x": 0, "y": 1, "yshift": 3, "xanchor": "left", "yanchor": "bottom",'),
+        ('"showarrow": false, "font": {"size": 12}}]}, "panels": [{"x": "xaxis", "y": "yaxis", "inner": [38.6,'),
+        ('22.4, 449.6, 242.5], "outer": [4.0, 4.0, 468.2, 284.0], "titles": {"xaxis": "case", "yaxis":'),
+        ('"row"}}, {"x": "xaxis2", "y": "yaxis2", "inner": [550.5, 29.7, 756.0, 235.2], "outer": [522.7, 15.2,'),
+        ('764.0, 258.3], "titles": {"xaxis2": "", "yaxis2": ""}}], "scales": [{"trace": 0, "panel": 0,'),
+        ('"inner": [461.6, 22.4, 476.2, 242.5], "outer": [461.6, 22.4, 522.7, 242.5]}], "heading": [],'),
+        '"ratio": true}',
+    ]
+
+
+@pytest.mark.parametrize("place", ["above", "below", "right", "upper right", "lower right"])
+def test_the_legend_of_a_sheet_keeps_apart_from_its_heading(place):
+    sheet = one(Line(X, Y, BLUE, label="curve"), Line(X, Y, SKY, label="other one"))
+    sheet.legend, sheet.heading = Legend(place, 2 if place in ("above", "below") else 1), "heading"
+    (key,), (placed,) = layout(sheet).keys, layout(sheet).placed
+    assert key.x >= 0.0 and key.x + key.width <= 6.4 * 72.0 and key.y + key.height <= 4.0 * 72.0
+    left, top, right, bottom = placed.inner
+    assert key.y + key.height < top or key.y > bottom or key.x > right
+    assert key.y > 10.0 and left < right
+
+
+@pytest.mark.parametrize(
+    ("title", "value", "said"),
+    [("case (m)", 0.9, "case: 2 near m"), ("case", 2.0, "three"), ("", 0.0, "one"), ("case (m)", -5.0, "one")],
+)
+def test_a_value_beside_words_has_those_nearest_to_it(title, value, said):
+    axis = Axis(title, ticks={0.0: "one", 1.0: "2\nnear", 2.0: "three"})
+    assert interactive._word(axis, title, value) == said
