@@ -301,7 +301,7 @@ def test_rules_are_too_small_by_more_than_a_thousandth(rules_rad, said):
     assert budget_words._too_small([judged_of(rules_rad=rules_rad)]) == said
 
 
-# ------------------------------------------------------------------- two unlike requirements, held as a whole
+# ----------------------------------------------------------------------- two unlike requirements, held as a whole
 def a_share(name, kind, k, total_rad, allowed):
     """What one source means; all of its numbers follow from ``k``."""
     made = SimpleNamespace(name=name, kind=kind, statistic=f"statistic {k}", origin=f"origin {k}")
@@ -314,10 +314,8 @@ def two_requirements():
     first = Requirement(ErrorIndex("APE"), 0.9973, "mixed", (0, 1), 5e-6)
     second = Requirement(ErrorIndex("PDE", 0.5, 3.0), 0.95, "ensemble", (1,), None, 60.0)
     found = []
-    for required, name, rules_rad, quantile_rad in (
-        (first, "code_word", 6e-6, 4e-6),
-        (second, "slow_drift", 2e-6, 3e-6),
-    ):
+    given = (first, "code_word", 6e-6, 4e-6), (second, "slow_drift", 2e-6, 3e-6)
+    for required, name, rules_rad, quantile_rad in given:
         total = SimpleNamespace(
             required=required,
             by_rules_rad=rules_rad,
@@ -330,7 +328,7 @@ def two_requirements():
         allowed = [1.5, math.inf, 0.0, None]
         shares = [a_share(*of, k + 1, quantile_rad, allowed[k]) for k, of in enumerate(names)]
         shares = shares[::-1] if name == "code_word" else shares[:2]
-        curves = {"size_rad": np.array([0.0, 2e-6, 8e-6]), "beyond": np.array([1.0, 0.25, 0.0])}
+        curves = {"size_rad": np.array([0.0, 2e-6, 6.25e-6]), "beyond": np.array([1.0, 0.25, 0.0])}
         found.append(SimpleNamespace(name=name, total=total, shares=shares, **curves))
     return found
 
@@ -397,22 +395,22 @@ def test_distributions_under_two_unlike_requirements_as_a_whole():
             "the share that is allowed lies beyond: left of the limit the requirement is met."
         ),
         {
-            "size, code_word (rad)": [0.0, 2e-06, 8e-06],
+            "size, code_word (rad)": [0.0, 2e-06, 6.25e-06],
             "share beyond it, code_word": [1.0, 0.25, 0.0],
-            "size, slow_drift (rad)": [0.0, 2e-06, 8e-06],
+            "size, slow_drift (rad)": [0.0, 2e-06, 6.25e-06],
             "share beyond it, slow_drift": [1.0, 0.25, 0.0],
         },
         "Sheet width=7.6 height=3.25 widths=[1 1] legend=<place=above columns=5>",
-        ("Panel 0 0 x=<title=radial error (µrad) low=0 high=8 most=6> y=<title=larger errors (%) log=True"),
-        "  low=0.009 high=200> title=code word: APE, 99.73 %",
-        "Line x=[0 2 8] y=[100 25 0.0009] colour=#0072B2 width=1.6 label=larger errors",
+        "Panel 0 0 x=<title=radial error (µrad) low=0 high=6.6 most=6> y=<title=larger errors (%)",
+        "  log=True low=0.009 high=200> title=code word: APE, 99.73 %",
+        "Line x=[0 2 6.25] y=[100 25 0.0009] colour=#0072B2 width=1.6 label=larger errors",
         "Rule at=5 upright=True colour=#D55E00 dash=-- width=1.4 label=limit",
         "Rule at=6 upright=True colour=#777777 dash=-. width=1.2 label=total by the rules",
         "Rule at=0.27 upright=False dash=: width=0.9 label=share allowed",
         "Line x=[4] y=[0.27] dash= label=total by the distribution marker=o",
-        ("Panel 0 1 x=<title=error about y (µrad) low=0 high=8 most=6> y=<title=larger errors (%) log=True"),
-        "  low=0.166667 high=200> title=slow drift: PDE 500 ms 3 s apart, 95 %",
-        "Line x=[0 2 8] y=[100 25 0.0166667] colour=#0072B2 width=1.6 label=larger errors",
+        "Panel 0 1 x=<title=error about y (µrad) low=0 high=6.25 most=6> y=<title=larger errors (%)",
+        "  log=True low=0.166667 high=200> title=slow drift: PDE 500 ms 3 s apart, 95 %",
+        "Line x=[0 2 6.25] y=[100 25 0.0166667] colour=#0072B2 width=1.6 label=larger errors",
         "Rule at=2 upright=True colour=#777777 dash=-. width=1.2 label=total by the rules",
         "Rule at=5 upright=False dash=: width=0.9 label=share allowed",
         "Line x=[3] y=[5] dash= label=total by the distribution marker=o",
