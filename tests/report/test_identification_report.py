@@ -14,14 +14,19 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
+from drawn import figure_of, lines_of
+from drawn import plain as rounded_numbers
 from microrad import report
 from microrad.core.kernels import play_response
 from microrad.core.units import format_quantity
-from microrad.lab.identify import Refused, identify, mirror_file_text
+from microrad.lab.identify import BoucWenFit, PrandtlIshlinskiiFit, Refused, identify, mirror_file_text
 from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
+from microrad.mirror.hysteresis import BoucWen
+from microrad.report.identification import data as identification_numbers
 from microrad.report.identification import figures, parameters, words
 from microrad.report.identification import page as identification_page
+from microrad.report.identification import terminal as identification_terminal
 from microrad.report.identification.figures import identification_figures
 from microrad.report.identification.page import BEGINS
 from microrad.report.identification.parameters import (
@@ -854,3 +859,534 @@ def test_the_data_say_whether_the_output_rises_or_falls_with_the_drive(sign):
     plays = report.identification_data(found, found.chosen)["parameters"]["prandtl_ishlinskii"]
     assert plays["sign"] == sign
     assert sum(plays["weights_rad_v"]) > 0.0
+
+
+# --------------------------------------------------------------------------- records unlike each other, held as a whole
+def ns(**values):
+    return SimpleNamespace(**values)
+
+
+def made(kind, **values):
+    """A record of a kind with these fields alone."""
+    found = object.__new__(kind)
+    for name, value in values.items():
+        object.__setattr__(found, name, value)
+    return found
+
+
+def rich_linear():
+    """Two pairs and a real pole, one zero, three frequencies: every number unlike the others."""
+    poles = 2 * np.pi * np.array([-3.0 + 4.0j, -3.0 - 4.0j, -12.0 + 0j])
+    freq = np.array([2.0, 8.0, 32.0])
+    value, left = np.array([4e-3, -1e-3j, 2e-4]), np.array([1e-4, 2e-5 + 1e-5j, -1e-5])
+    error = np.array([3e-5, 2e-5, 1e-5])
+    return ns(
+        order=3,
+        hold="zero-order",
+        reason="the knee of the criterion",
+        excited_hz=(2.0, 32.0),
+        rate_hz=500.0,
+        poles_rad_s=poles,
+        poles_error_rad_s=2 * np.pi * np.array([0.25, 0.25, 0.5]),
+        zeros_rad_s=2 * np.pi * np.array([40.0 + 0j]),
+        zeros_error_rad_s=2 * np.pi * np.array([1.5]),
+        dc_gain=np.array([[5e-3]]),
+        dc_gain_error=np.array([[4e-4]]),
+        edge_gain=np.array([[4.5e-3]]),
+        edge_gain_error=np.array([[2e-4]]),
+        fit_percent=np.array([97.5]),
+        residual_rms=np.array([6e-7]),
+        scan=(),
+        residual=left[:, None, None],
+        response=ns(
+            freq_hz=freq,
+            response=value[:, None, None],
+            standard_error=error[:, None, None],
+            noise_standard_error=0.5 * error[:, None, None],
+            distortion_standard_error=None,
+            coherence=np.array([[0.99], [0.97], [0.8]]),
+            method="a method",
+        ),
+    )
+
+
+def test_the_response_of_a_linear_part_is_drawn_with_its_model_levels_and_coherence():
+    assert figure_of(figures.response(rich_linear())) == [
+        "response",
+        "Frequency response of the linear part",
+        (
+            "Frequency response without a model (a method) and the linear model behind the "
+            "same zero-order hold. Below: what the model leaves at each frequency, and as rms "
+            "over bands one standard error of the response with the parts of it that are noise "
+            "and nonlinear distortion, where the recordings tell them apart."
+        ),
+        {},
+        "Sheet width=8.2 height=8.4 heights=[3 2 2.4 1.2] share_x=True",
+        "Panel 0 0 x=<log=True> y=<title=gain (µrad/V) log=True> legend=<>",
+        "Area rings=[[[2 3958.42] [8 972.281] [32 186.141] [32 213.859] [8 1027.72] [2 4041.58]]]",
+        "  colour=#56B4E9 opacity=0.6 label=95 % confidence",
+        "Line x=[2 8 32] y=[4000 1000 200] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        ("Line x=[2 8 32] y=[3900 1010.2 210] colour=#D55E00 dash=-- width=1.4 label=linear model, order 3"),
+        "Panel 1 0 x=<log=True> y=<title=phase (°) low=-111.134 high=20>",
+        ("Area rings=[[[2 -0.59557] [8 -91.5884] [32 -3.97358] [32 3.97358] [8 -88.4116] [2 0.59557]]]"),
+        "  colour=#56B4E9 opacity=0.6",
+        "Line x=[2 8 32] y=[0 -90 0] colour=#0072B2 dash= marker=. size=4.5",
+        "Line x=[2 8 32] y=[0 -91.1344 0] colour=#D55E00 dash=-- width=1.4",
+        "Panel 2 0 x=<log=True> y=<title=level (µrad/V) log=True> legend=<>",
+        ("Line x=[2 8 32] y=[100 22.3607 10] colour=#E69F00 dash= label=measured less modelled marker=."),
+        "  size=4",
+        "Line x=[2 8 32] y=[30 20 10] width=1.6 label=standard error",
+        "Line x=[2 8 32] y=[15 10 5] colour=#009E73 dash=-. width=1.6 label=noise",
+        "Panel 3 0 x=<title=frequency (Hz) log=True> y=<title=coherence (1) low=0.78 high=1.01>",
+        "Line x=[2 8 32] y=[0.99 0.97 0.8] colour=#0072B2 dash= marker=. size=4.5",
+    ]
+
+
+def test_poles_and_zeros_are_drawn_with_their_own_errors():
+    assert figure_of(figures.poles(rich_linear())) == [
+        "poles",
+        "Poles and zeros of the linear part",
+        (
+            "Poles and zeros with one standard error. A damping of 1 is a real one; zeros "
+            "below 0 lie in the right half plane. What lies outside the shaded band is "
+            "extrapolated."
+        ),
+        {},
+        "Sheet width=8.2 height=3.4",
+        ("Panel 0 0 x=<title=natural frequency (Hz) log=True low=0.6 high=120> y=<title=damping ratio (1)>"),
+        "  legend=<place=above columns=3>",
+        "Span low=2 high=32 upright=True colour=#56B4E9 opacity=0.2 label=excited band",
+        ("Line x=[5 12] y=[0.6 1] colour=#D55E00 dash= label=poles marker=x size=8 face= x_arms=[[0.25"),
+        "  0.5] [0.25 0.5]] y_arms=[[0.05 0] [0.05 0]]",
+        ("Line x=[40] y=[-1] colour=#0072B2 dash= label=zeros marker=o size=8 face= x_arms=[[1.5] [1.5]]"),
+        "  y_arms=[[0] [0]]",
+        "Rule at=0 upright=False width=0.7",
+    ]
+
+
+def test_the_numbers_of_a_linear_part_stand_under_their_own_names():
+    assert rounded_numbers(identification_numbers._linear_data(rich_linear())) == {
+        "order": 3,
+        "reason": "the knee of the criterion",
+        "fit_percent": 97.5,
+        "residual_rms_rad": 6e-07,
+        "excited_hz": [2.0, 32.0],
+        "rate_hz": 500.0,
+        "dc_gain_rad_v": 0.005,
+        "dc_gain_standard_error_rad_v": 0.0004,
+        "edge_gain_rad_v": 0.0045,
+        "edge_gain_standard_error_rad_v": 0.0002,
+        "poles_and_zeros": [
+            {
+                "kind": "pole",
+                "freq_hz": 5.0,
+                "freq_error_hz": 0.25,
+                "damping": 0.6,
+                "damping_error": 0.05,
+                "excited": True,
+            },
+            {
+                "kind": "pole",
+                "freq_hz": 12.0,
+                "freq_error_hz": 0.5,
+                "damping": 1.0,
+                "damping_error": 0.0,
+                "excited": True,
+            },
+            {
+                "kind": "zero",
+                "freq_hz": 40.0,
+                "freq_error_hz": 1.5,
+                "damping": -1.0,
+                "damping_error": 0.0,
+                "excited": False,
+            },
+        ],
+        "orders": [],
+    }
+    rows = [[str(cell) for cell in row] for row in identification_page._roots(rich_linear()).rows]
+    assert rows == [
+        ["pole pair", "5 Hz", "0.25 Hz", "0.6", "0.05", "yes", ""],
+        ["pole, real", "12 Hz", "0.5 Hz", "1", "", "yes", ""],
+        ["zero, real", "40 Hz", "1.5 Hz", "−1", "", "no", "extrapolated"],
+        ["gain at zero frequency", "5 mrad/V", "0.4 mrad/V", "", "", "no", "extrapolated"],
+        ["gain at 2 Hz", "4.5 mrad/V", "0.2 mrad/V", "", "", "yes", ""],
+    ]
+
+
+def test_a_model_with_confidence_has_bands_about_its_size_and_its_phase():
+    sheet, panels = figures.grid(8.0, 4.0, 2)
+    freq, value = np.array([1.0, 10.0, 100.0]), np.array([2.0 + 0j, -1.0j, -0.5])
+    measured = figures.Measured(freq[:2], value[:2] * np.array([1.5, 0.5j]), np.array([0.25, 0.125]))
+    model = figures.Modelled(freq, value, "a model", np.array([0.1, 0.2, 0.05]), np.array([0.01, 0.02, 0.03]))
+    figures.bode(tuple(panels), measured, model)
+    assert lines_of(sheet) == [
+        "Sheet width=8 height=4 heights=[1 1]",
+        "Panel 0 0 x=<log=True> y=<log=True low=0.25>",
+        ("Area rings=[[[1 2.75] [10 0.375] [10 0.625] [1 3.25]]] colour=#56B4E9 opacity=0.6 label=95 %"),
+        "  confidence",
+        "Line x=[1 10] y=[3 0.5] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        "Area rings=[[[1 1.9] [10 0.8] [100 0.45] [100 0.55] [10 1.2] [1 2.1]]] colour=#D55E00",
+        "  opacity=0.3 label=95 % confidence of the model",
+        "Line x=[1 10 100] y=[2 1 0.5] colour=#D55E00 dash=-- width=1.4 label=a model",
+        "Panel 1 0 x=<log=True> y=<title=phase (°) low=-200 high=20>",
+        ("Area rings=[[[1 -4.78019] [10 -14.4775] [10 14.4775] [1 4.78019]]] colour=#56B4E9 opacity=0.6"),
+        "Line x=[1 10] y=[0 0] colour=#0072B2 dash= marker=. size=4.5",
+        "Area rings=[[[1 -0.572958] [10 -91.1459] [100 -181.719] [100 -178.281] [10 -88.8541] [1",
+        "  0.572958]]] colour=#D55E00 opacity=0.3",
+        "Line x=[1 10 100] y=[0 -90 -180] colour=#D55E00 dash=-- width=1.4",
+    ]
+
+
+def two_recordings():
+    """A sine, fitted and unseen, and a drive of many frequencies, unseen only; made of few samples."""
+    drive = np.array([0.0, 1.0, 0.0, -1.0] * 4)
+    other = np.array([0.0, 2.0, -1.0, 3.0, -3.0, 1.0, 0.5, -0.5])
+    first = ns(
+        start=4,
+        split=12,
+        measured_rad=1e-3 * drive + np.tile([3e-5, 1e-5, -2e-5, 4e-5], 4),
+        model_rad=0.9e-3 * drive + 7e-5,
+        residual_rad=1e-4 * drive + 1e-6,
+    )
+    second = ns(
+        start=2,
+        split=2,
+        measured_rad=2e-3 * other + np.array([0.0, 0.0, 3e-4, 1e-4, 2e-4, -5e-4, 4e-4, -1e-4]),
+        model_rad=1.5e-3 * other + 6e-4,
+        residual_rad=5e-4 * other,
+    )
+    one = figures.Shown("one.csv", "loops", drive, first.measured_rad, 8.0, words.Sine(2.0, 1.0), first)
+    two = figures.Shown("two.csv", "validation", other, second.measured_rad, 4.0, None, second)
+    return [one, two]
+
+
+def test_loops_of_a_sine_and_of_another_drive_are_drawn_less_their_own_lines():
+    assert figure_of(figures.loops(two_recordings(), ns(chosen="linear"))) == [
+        "loops",
+        "Loops, measured against modelled",
+        (
+            "Measured against modelled by linear. Right: the same less the straight line that "
+            "fits the measured output of that recording best, which leaves the hysteresis, and "
+            "at high frequency the phase lag with it. Of a sine of constant amplitude the last "
+            "period of either part is drawn, of others at most some twenty swings; the initial "
+            "transient is left out."
+        ),
+        {},
+        "Sheet width=8.2 height=5.5 heights=[1 1] widths=[1 1] legend=<place=above columns=3>",
+        "Panel 0 0 x=<title=drive (V)> y=<title=output (mrad)> title=one.csv",
+        ("Line x=[-1 0 1 0 -1] y=[-0.975 0.015 0.995 -0.035 -0.975] colour=#56B4E9 width=2 label=measured,"),
+        "  fitted",
+        ("Line x=[0 1 0 -1] y=[0.015 0.995 -0.035 -0.975] colour=#0072B2 width=2 label=measured, unseen by"),
+        "  the fit",
+        "Line x=[-1 0 1 0 -1] y=[-0.845 0.055 0.955 0.055 -0.845] colour=#D55E00 dash=-- width=1",
+        "  label=modelled",
+        ("Line x=[0 1 0 -1] y=[0.055 0.955 0.055 -0.845] colour=#D55E00 dash=-- width=1 label=modelled"),
+        ("Panel 0 1 x=<title=drive (V)> y=<title=output less line (µrad)> title=2 Hz, ± 1 V: unseen 70.7"),
+        "  µrad rms",
+        "Line x=[-1 0 1 0 -1] y=[10 15 10 -35 10] colour=#56B4E9 width=2 label=measured, fitted",
+        ("Line x=[0 1 0 -1] y=[15 10 -35 10] colour=#0072B2 width=2 label=measured, unseen by the fit"),
+        "Line x=[-1 0 1 0 -1] y=[140 55 -30 55 140] colour=#D55E00 dash=-- width=1 label=modelled",
+        "Line x=[0 1 0 -1] y=[55 -30 55 140] colour=#D55E00 dash=-- width=1 label=modelled",
+        "Panel 1 0 x=<title=drive (V)> y=<title=output (mrad)> title=two.csv (validation)",
+        "Line x=[-1 3 -3 1 0.5 -0.5] y=[-1.76667 6.03333 -5.86667 1.43333 1.33333 -1.16667]",
+        "  colour=#0072B2 width=2 label=measured, unseen by the fit",
+        "Line x=[-1 3 -3 1 0.5 -0.5] y=[-0.966667 5.03333 -3.96667 2.03333 1.28333 -0.216667]",
+        "  colour=#D55E00 dash=-- width=1 label=modelled",
+        ("Panel 1 1 x=<title=drive (V)> y=<title=output less line (µrad)> title=many frequencies: unseen"),
+        "  924 µrad rms",
+        ("Line x=[-1 3 -3 1 0.5 -0.5] y=[191.87 157.724 8.94309 -525.203 354.065 -187.398] colour=#0072B2"),
+        "  width=2 label=measured, unseen by the fit",
+        ("Line x=[-1 3 -3 1 0.5 -0.5] y=[991.87 -842.276 1908.94 74.7967 304.065 762.602] colour=#D55E00"),
+        "  dash=-- width=1 label=modelled",
+    ]
+
+
+def test_residuals_of_two_recordings_are_drawn_where_they_were_seen_and_unseen():
+    assert figure_of(figures.residuals(two_recordings())) == [
+        "residuals",
+        "Residuals",
+        (
+            "Measured less modelled. Light: samples that the model was fitted to; dark: "
+            "samples that no fit has seen. The initial transient is left out."
+        ),
+        {},
+        "Sheet width=8.2 height=2.4 widths=[1 1]",
+        "Panel 0 0 x=<title=time (s) most=7> y=<title=residual (µrad)> title=one.csv",
+        ("Line x=[0.5 0.625 0.75 0.875 1 1.125 1.25 1.375] y=[1 101 1 -99 1 101 1 -99] colour=#56B4E9"),
+        "  width=0.7 name=fitted",
+        "Line x=[1.5 1.625 1.75 1.875] y=[1 101 1 -99] colour=#0072B2 width=0.7 name=unseen",
+        "Rule at=0 upright=False width=0.7",
+        "Panel 0 1 x=<title=time (s) most=7> y=<title=residual (µrad)> title=two.csv (validation)",
+        "Line x=[] y=[] colour=#56B4E9 width=0.7 name=fitted",
+        ("Line x=[0.5 0.75 1 1.25 1.5 1.75] y=[-500 1500 -1500 500 250 -250] colour=#0072B2 width=0.7"),
+        "  name=unseen",
+        "Rule at=0 upright=False width=0.7",
+    ]
+
+
+def test_excitations_of_two_recordings_are_drawn_with_the_lines_of_their_spectra():
+    assert figure_of(figures.excitation(two_recordings(), ns(linear=None))) == [
+        "excitation",
+        "Excitation",
+        (
+            "Drive of each recording, and the amplitude of its spectral lines (the strongest "
+            "of those that fall on one point). Shaded: the band that counts as excited for the "
+            "linear part."
+        ),
+        {},
+        "Sheet width=8.2 height=3.9 heights=[1 1] widths=[1 1]",
+        "Panel 0 0 x=<title=time (s) most=7> y=<title=drive (V)> title=one.csv (loops)",
+        ("Line x=[0 0.125 0.25 0.375 0.5 0.625 0.75 0.875 1 1.125 1.25 1.375 1.5 1.625 1.75 1.875] y=[0 1"),
+        "  0 -1 0 1 0 -1 0 1 0 -1 0 1 0 -1] width=0.7",
+        "Panel 0 1 x=<title=frequency (Hz) log=True low=0.5 high=4> y=<title=amplitude (V) log=True",
+        "  low=1e-05> title=2 Hz",
+        "Line x=[2 2 2] y=[1e-05 1 nan] width=0.8 whole=True",
+        "Panel 1 0 x=<title=time (s) most=7> y=<title=drive (V)> title=two.csv (validation)",
+        "Line x=[0 0.25 0.5 0.75 1 1.25 1.5 1.75] y=[0 2 -1 3 -3 1 0.5 -0.5] width=0.7",
+        "Panel 1 1 x=<title=frequency (Hz) log=True low=0.5 high=2> y=<title=amplitude (V) log=True",
+        "  low=2.25e-05>",
+        ("Line x=[0.5 0.5 0.5 1 1 1 1.5 1.5 1.5 2 2 2] y=[2.25e-05 0.521264 nan 2.25e-05 0.637377 nan"),
+        "  2.25e-05 1.67056 nan 2.25e-05 2.25 nan] width=0.8 whole=True",
+    ]
+
+
+def test_the_tests_of_a_residual_are_those_of_the_longest_unseen_part():
+    one, two = (each.prediction for each in two_recordings())
+    two.residual_rad = np.array([0.0, 0.0, 1e-6, -1e-6, 2e-6, -2e-6, 1e-6, 0.0])
+    score = ns(model="linear")
+    test = ns(
+        bound=0.25, autocorrelation=np.array([0.1, -0.3, 0.2]), cross_correlation=np.array([0.4, 0.05]), white=False,
+        independent=True, outside=(0.125, 0.0625), samples=77,
+    )  # fmt: skip
+    recordings = [ns(path="/a/one.csv", rate_hz=8.0), ns(path="/a/two.csv", rate_hz=4.0)]
+    found = ns(residual=test, scores=[score], chosen="linear", predictions=[(one, two)], recordings=recordings)
+    assert figure_of(figures.residual_tests(found)) == [
+        "tests",
+        "Tests of the residual",
+        (
+            "Of the longest unseen part, two.csv: of a residual that is noise 95 % of the "
+            "lines lie within the shaded ± 0.25. For the correlation with the drive both are "
+            "whitened first."
+        ),
+        {},
+        "Sheet width=8.2 height=2.9 widths=[1 1 1]",
+        "Panel 0 0 x=<title=lag (samples)> y=<title=autocorrelation (1) low=-0.55 high=0.55>",
+        "Span low=-0.25 high=0.25 upright=False colour=#56B4E9 opacity=0.4",
+        "Line x=[1 1 1 2 2 2 3 3 3] y=[0 0.1 nan 0 -0.3 nan 0 0.2 nan] colour=#0072B2 width=1.2",
+        "  whole=True",
+        "Rule at=0 upright=False width=0.7",
+        "Panel 0 1 x=<title=lag (samples)> y=<title=correlation with drive (1) low=-0.55 high=0.55>",
+        "Span low=-0.25 high=0.25 upright=False colour=#56B4E9 opacity=0.4",
+        "Line x=[0 0 0 1 1 1] y=[0 0.4 nan 0 0.05 nan] colour=#0072B2 width=1.2 whole=True",
+        "Rule at=0 upright=False width=0.7",
+        ("Panel 0 2 x=<title=frequency (Hz) log=True> y=<title=density (µrad/√Hz) log=True> legend=<>"),
+        "Line x=[0.666667 1.33333 2] y=[1526.48 3171.25 2016.67] dash=-- width=1 label=output",
+        "Line x=[0.666667 1.33333 2] y=[0.513701 1.47196 1.5] colour=#0072B2 width=1 label=residual",
+    ]
+    assert words.residual_sentences(found) == [
+        "The residual is not white: 12 % of its autocorrelations lie outside ± 0.25.",
+        ("It is independent of the drive: 6 % of the cross-correlations lie outside; 5 % would be noise."),
+    ]
+    assert rounded_numbers(identification_numbers._residual_data(found)) == {
+        "samples": 77,
+        "bound": 0.25,
+        "white": False,
+        "independent_of_drive": True,
+        "share_of_autocorrelations_outside": 0.125,
+        "share_of_cross_correlations_outside": 0.0625,
+        "autocorrelation": [0.1, -0.3, 0.2],
+        "cross_correlation": [0.4, 0.05],
+    }
+
+
+def a_joint_fit():
+    """A fit of a hysteresis with a linear part of which one pole was held, and a creep lag."""
+    poles = ns(frequencies_hz=(7.0, 70.0, 700.0), dampings=(0.1, 0.2, 1.0))
+    zeros = ns(frequencies_hz=(90.0,), dampings=(-0.3,))
+    named = [ns(name="alpha", unit="rad/V"), ns(name="pole 1", unit="Hz"), ns(name="delay", unit="s")]
+    correlation = np.array([[1.0, 0.1, -0.99], [0.1, 1.0, 0.96], [-0.99, 0.96, 1.0]])
+    return ns(
+        structure=ns(parameters=named),
+        fit=ns(
+            values=np.array([2.5e-3, 7.125, -3e-4]),
+            standard_errors=np.array([1e-5, 0.0625, 2e-5]),
+            correlation=correlation,
+        ),
+        linear=ns(poles=poles, zeros=zeros),
+        creep=ns(time_constants_s=(0.5, 20.0)),
+    )
+
+
+def test_held_poles_zeros_and_lags_stand_behind_the_fitted_parameters():
+    rows = parameter_rows(a_joint_fit())
+    assert [[row.name, *row.shown, row.note] for row in rows][:1] == [
+        ["alpha", pytest.approx(2.5), pytest.approx(0.01), "mrad/V", ""]
+    ]
+    assert rounded_numbers(rows) == [
+        {"name": "alpha", "value": 0.0025, "standard_error": 1e-05, "unit": "rad/V", "note": ""},
+        {"name": "pole 1", "value": 7.125, "standard_error": 0.0625, "unit": "Hz", "note": ""},
+        {"name": "delay", "value": -0.0003, "standard_error": 2e-05, "unit": "s", "note": ""},
+        {
+            "name": "pole 2",
+            "value": 70.0,
+            "standard_error": "nan",
+            "unit": "Hz",
+            "note": "held, from the frequency response",
+        },
+        {
+            "name": "pole 2 damping",
+            "value": 0.2,
+            "standard_error": "nan",
+            "unit": "",
+            "note": "held, from the frequency response",
+        },
+        {
+            "name": "pole 3",
+            "value": 700.0,
+            "standard_error": "nan",
+            "unit": "Hz",
+            "note": "held, from the frequency response",
+        },
+        {
+            "name": "zero 1",
+            "value": 90.0,
+            "standard_error": "nan",
+            "unit": "Hz",
+            "note": "held, from the frequency response",
+        },
+        {
+            "name": "zero 1 damping",
+            "value": -0.3,
+            "standard_error": "nan",
+            "unit": "",
+            "note": "held, from the frequency response",
+        },
+        {"name": "creep lag 1", "value": 0.5, "standard_error": "nan", "unit": "s", "note": "chosen"},
+        {"name": "creep lag 2", "value": 20.0, "standard_error": "nan", "unit": "s", "note": "chosen"},
+    ]
+    assert [(a, b, round(r, 6)) for a, b, r in parameters.correlations(a_joint_fit(), 0.5)] == [
+        ("delay", "alpha", -0.99),
+        ("delay", "pole 1", 0.96),
+    ]
+
+
+def test_weights_that_fall_with_the_drive_have_their_sign_and_a_held_one_says_so():
+    fit = made(
+        PrandtlIshlinskiiFit,
+        thresholds_v=np.array([0.0, 1.25, 3.0]),
+        sign=-1.0,
+        weights_rad_per_v=np.array([2e-3, 0.0, 5e-4]),
+        standard_errors_rad_per_v=np.array([1e-5, 3e-5, 2e-5]),
+        condition_number=12.5,
+        colour_inflation=3.25,
+    )
+    assert rounded_numbers(parameter_rows(fit)) == [
+        {"name": "weight at 0 V", "value": -0.002, "standard_error": 1e-05, "unit": "rad/V", "note": ""},
+        {
+            "name": "weight at 1.25 V",
+            "value": 0.0,
+            "standard_error": 3e-05,
+            "unit": "rad/V",
+            "note": "held at 0 by its bound",
+        },
+        {"name": "weight at 3 V", "value": -0.0005, "standard_error": 2e-05, "unit": "rad/V", "note": ""},
+    ]
+    assert rounded_numbers(identification_numbers._parameter_data(fit)) == {
+        "admissible": True,
+        "not_identified": {},
+        "agreeing_starts": None,
+        "starts": None,
+        "condition_number": 12.5,
+        "colour_inflation": 3.25,
+        "thresholds_v": [0.0, 1.25, 3.0],
+        "weights_rad_v": [0.002, 0.0, 0.0005],
+        "standard_errors_rad_v": [1e-05, 3e-05, 2e-05],
+        "sign": -1.0,
+    }
+    assert parameters.notes(fit) == [
+        ("The weights are a non-negative least-squares problem, which has one minimum: no starts are needed."),
+        ("Condition number 12.5; the variances are inflated 3.25 times for the colour of the residual."),
+    ]
+    rows = [[str(cell) for cell in row] for row in identification_page._model(fit).rows]
+    assert rows == [
+        ["weight at 0 V", "−2", "0.01", "mrad/V", ""],
+        ["weight at 1.25 V", "0", "0.03", "mrad/V", "held at 0 by its bound"],
+        ["weight at 3 V", "−0.5", "0.02", "mrad/V", ""],
+    ]
+
+
+def test_a_bouc_wen_fit_says_what_is_not_identified_and_how_many_starts_agreed():
+    covariance = np.diag([1e-10, 4e-14, 9e-12, 1e-12, 1e-2, 4e-4])
+    covariance[4, 0] = covariance[0, 4] = -9.75e-7
+    fit = made(
+        BoucWenFit,
+        model=BoucWen(1e-3, 2e-6, 3e-4, 4e-5, 5.0, 1.5, rate_limit_v_s=700.0),
+        covariance=covariance,
+        not_identified=(ns(name="d2", reason="too slow"),),
+        agreeing_starts=3,
+        start_rms_percent=(1.0, 2.0, 3.0, 4.0),
+        condition_number=450.0,
+        colour_inflation=1.75,
+    )
+    assert rounded_numbers(parameter_rows(fit)) == [
+        {"name": "d1", "value": 0.001, "standard_error": 1e-05, "unit": "rad/V", "note": ""},
+        {"name": "d2", "value": 2e-06, "standard_error": 2e-07, "unit": "s/V", "note": ""},
+        {"name": "epsilon", "value": 0.0003, "standard_error": 3e-06, "unit": "rad/V", "note": ""},
+        {"name": "delta", "value": 4e-05, "standard_error": 1e-06, "unit": "s/V", "note": ""},
+        {"name": "alpha", "value": 5.0, "standard_error": 0.1, "unit": "1/V", "note": ""},
+        {"name": "beta", "value": 1.5, "standard_error": 0.02, "unit": "1/V", "note": ""},
+    ]
+    assert parameters.notes(fit) == [
+        "3 of 4 starts reached the best fit.",
+        "Correlated above 0.95: alpha and d1 −0.975.",
+        (
+            "Better fixed than its parts: the hysteresis of a slow settled loop, |epsilon| / "
+            "(alpha + sign(epsilon) beta) = 46.15 ± 0.86 µrad."
+        ),
+        ("Condition number 450; the variances are inflated 1.75 times for the colour of the residual."),
+    ]
+    assert parameters.starts(fit) == (3, 4) and parameters.starts_text(fit) == "3 of 4 starts reached the best fit"
+    rows = [[str(cell) for cell in row] for row in identification_page._model(fit).rows]
+    assert rows == [
+        ["d1", "1", "0.01", "mrad/V", ""],
+        ["d2", "2e-06", "2e-07", "s/V", "not identified: too slow"],
+        ["epsilon", "0.3", "0.003", "mrad/V", ""],
+        ["delta", "4e-05", "1e-06", "s/V", ""],
+        ["alpha", "5", "0.1", "1/V", ""],
+        ["beta", "1.5", "0.02", "1/V", ""],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("count", "noun", "said"), [(0, "record", "0 records"), (1, "record", "1 record"), (2, "pole", "2 poles")]
+)
+def test_a_number_stands_with_its_noun(count, noun, said):
+    assert identification_terminal.counted(count, noun) == said
+
+
+@pytest.mark.parametrize(
+    ("refused", "width", "room", "said"),
+    [
+        (0, 40, 9, ["- one short warning", "- two", "- three of them with more words than a", "  line has"]),
+        (
+            2,
+            40,
+            3,
+            ["- one short warning", "- two", "- 1 more warning and 2 refused models: see the report, or --json."],
+        ),
+        (0, 40, 2, ["- one short warning", "- 2 more warnings: see the report, or --json."]),
+        (1, 12, 2, ["- one short …", "- 2 more warnings and 1 refused model: see the report, or --json."]),
+    ],
+)
+def test_warnings_that_have_no_room_are_counted(refused, width, room, said):
+    warnings = ["one short warning", "two", "three of them with more words than a line has"]
+    shown = identification_terminal.warnings_text(warnings, refused, width, room).split("\n")
+    assert len(shown) <= max(room, 2) + 1
+    assert shown[-1] == said[-1] and shown[0][:9] == said[0][:9]
+
+
+def test_a_drive_of_sixty_hertz_about_six_volts_is_told_in_volts():
+    t = np.arange(400) / 2000.0
+    recording = ns(drive=(3.0 + 2.5 * np.sin(2 * np.pi * 60.0 * t))[:, None], rate_hz=2000.0)
+    assert words.drive_text(recording, 2.0) == "60 Hz, ± 5 V about 6 V"
