@@ -1153,7 +1153,7 @@ def test_excitations_of_two_recordings_are_drawn_with_the_lines_of_their_spectra
 
 def test_the_tests_of_a_residual_are_those_of_the_longest_unseen_part():
     one, two = (each.prediction for each in two_recordings())
-    two.residual_rad = np.array([0.0, 0.0, 1e-6, -1e-6, 2e-6, -2e-6, 1e-6, 0.0])
+    two.split, two.residual_rad = 3, np.array([0.0, 0.0, 1e-6, -1e-6, 2e-6, -2e-6, 1e-6, 4e-7])
     score = ns(model="linear")
     test = ns(
         bound=0.25, autocorrelation=np.array([0.1, -0.3, 0.2]), cross_correlation=np.array([0.4, 0.05]), white=False,
@@ -1181,8 +1181,8 @@ def test_the_tests_of_a_residual_are_those_of_the_longest_unseen_part():
         "Line x=[0 0 0 1 1 1] y=[0 0.4 nan 0 0.05 nan] colour=#0072B2 width=1.2 whole=True",
         "Rule at=0 upright=False width=0.7",
         ("Panel 0 2 x=<title=frequency (Hz) log=True> y=<title=density (µrad/√Hz) log=True> legend=<>"),
-        "Line x=[0.666667 1.33333 2] y=[1526.48 3171.25 2016.67] dash=-- width=1 label=output",
-        "Line x=[0.666667 1.33333 2] y=[0.513701 1.47196 1.5] colour=#0072B2 width=1 label=residual",
+        "Line x=[0.8 1.6] y=[1430.16 1513.12] dash=-- width=1 label=output",
+        "Line x=[0.8 1.6] y=[0.78774 1.57868] colour=#0072B2 width=1 label=residual",
     ]
     assert words.residual_sentences(found) == [
         "The residual is not white: 12 % of its autocorrelations lie outside ± 0.25.",
