@@ -18,7 +18,7 @@ from scipy.sparse import csc_array
 
 from microrad.core import lti
 from microrad.export import choice, matrices
-from microrad.export.linear_import import Given, import_control, import_mat, matlab, mirror_file
+from microrad.export.linear_import import Given, hold, import_control, import_mat, matlab, mirror_file
 from microrad.export.linear_import import roots as roots_module
 from microrad.export.matrices.forms import floats, polynomials
 from microrad.export.records import ExportError
@@ -561,3 +561,295 @@ def test_scipy_sees_the_same_file(tmp_path):
     """The test's own files are what MATLAB would write: structures of one element."""
     path = save(tmp_path, s=SHAPES["states"])
     assert loadmat(path)["s"].shape == (1, 1)
+
+
+# ------------------------------------------------------------------------------------ whole texts and whole messages
+UNLIKE = Given('Tip & "tilt"', 1.5e-3, 250.0, 2.5, -1.0, 7.5, 0.75, 400.0, 12.5, "urad")
+
+
+def test_a_mirror_file_has_each_root_and_each_number_given_on_its_own_line(tmp_path):
+    """Roots that are not in their order: a pair above a real pole, a real zero in the right half plane."""
+    poles = [complex(-60.0, 800.0), complex(-60.0, -800.0), -500.0, -200.0]
+    fields = roots(poles=poles, zeros=[3000.0, -1000.0], k=-4.0)
+    text = import_mat(save(tmp_path, **fields), UNLIKE)
+    digest = hashlib.sha256((tmp_path / "model.mat").read_bytes()).hexdigest()
+    text = re.sub(r"\d+\.\d{6,}", lambda found: f"{float(found[0]):.6g}", text.replace(digest, "(digest)"))
+    assert text.split("\n") == [
+        "# Mirror imported from model.mat: linear, without hysteresis or creep.",
+        "#   sha256 (digest)",
+        'name = "Tip & \\"tilt\\""',
+        'travel = "0.0015 rad"                        # given on import, no linear model says it',
+        'composition = "cascade"                      # the linear part behind a straight gain',
+        'rate_limit = "250.0 V/s"                     # given on import, no linear model says it',
+        'bias = "2.5 V"                               # given on import, no linear model says it',
+        'drive_min = "-1.0 V"                         # given on import, no linear model says it',
+        'drive_max = "7.5 V"                          # given on import, no linear model says it',
+        "",
+        "[linear]",
+        'poles = ["31.831 Hz", "79.5775 Hz", "127.682 Hz"] # imported from model.mat',
+        "pole_dampings = [1.0, 1.0, 0.0747899] # imported from model.mat; 1 is a real pole",
+        'zeros = ["159.155 Hz", "477.465 Hz"] # imported from model.mat',
+        "zero_dampings = [1.0, -1.0] # imported from model.mat; 1 is a real zero",
+        ('normalise_at = "12.5 Hz"                     # given on import: where the gain below is taken'),
+        'excited_from = "0.75 Hz"                     # given on import, no linear model says it',
+        'excited_to = "400.0 Hz"                      # given on import, no linear model says it',
+        "",
+        "[prandtl_ishlinskii]",
+        'thresholds = ["0 V"]                         # no hysteresis: the linear model has none',
+        'weights = ["0.00017368 urad/V"]  # its size at normalise_at, imported from model.mat',
+        "",
+    ]
+
+
+def test_a_sampled_model_of_a_structure_says_how_it_was_sampled_and_which_it_is(tmp_path):
+    text = import_mat(save(tmp_path, first=1.0, tip=sampled_roots([0.9, 0.5])), replace(UNLIKE, output_unit="mrad"))
+    told = [line for line in text.split("\n") if line.startswith(("#", "name"))]
+    assert [line for line in told if "sha256" not in line] == [
+        "# Mirror imported from model.mat, tip: linear, without hysteresis or creep.",
+        "#   sampled there, Ts = 2e-05 s; its drive counts as held over each sample",
+        'name = "Tip & \\"tilt\\""',
+    ]
+
+
+REFUSED = {
+    "two poles coincide": roots(poles=[-300.0, -300.0], zeros=[]),
+    "a zero cancels": roots(poles=[-300.0, -600.0], zeros=[-600.0]),
+    "unstable": roots(poles=[-900.0, 300.0, -400.0], zeros=[]),
+    "an integrator": roots(poles=[-300.0, 0.0], zeros=[]),
+    "no conjugate": roots(poles=[-300.0, complex(-5.0, 3.0)], zeros=[]),
+    "falling": roots(k=-GAIN),
+    "a zero at rest": roots(zeros=[0.0]),
+    "no gain": roots(k=0.0),
+    "gains": roots(k=np.ones((1, 3))),
+    "a jump": roots(poles=[-300.0], zeros=[-200.0, -100.0]),
+    "a matrix of roots": roots(zeros=[]) | {"p": np.ones((2, 3))},
+    "channels": {"A": -np.eye(2), "B": np.eye(2), "C": np.ones((3, 2)), "D": np.zeros((3, 2))},
+    "shapes": states(D=np.zeros((1, 2))),
+    "hidden": HIDING,
+    "no time": states(Ts=-0.5),
+    "the band": states(Ts=4e-3),
+    "a whole sample": sampled_roots([0.0, 0.9]),
+    "sampled unstable": sampled_roots([0.3, 1.25]),
+    "sampled integrator": sampled_roots([0.3, 1.0]),
+    "sampled alike": sampled_roots([0.25, 0.25]),
+    "sampled sign": sampled_roots([-0.4, 0.9]),
+    "sampled jump": sampled_roots([0.5, 0.25], [0.2, 0.1]),
+    "sampled near": sampled_roots([0.5, 0.5 + 2e-8, 0.5 + 5e-8]),
+    "an input": states(InputUnit="rad"),
+    "no denominator": {"num": [[1.0]], "den": [[0.0, 0.0]]},
+    "no numerator": {"num": [[0.0]], "den": [[1.0, 2.0]]},
+    "an order": {"num": [[1.0]], "den": np.ones((1, 64))},
+    "complex numbers": {"num": [[1.0]], "den": [[1.0, 2.0 + 1.0j]]},
+    "not finite": states(C=np.array([[1.0, math.nan, 0.0]])),
+    "text": states(C="text"),
+    "sparse": states(A=csc_array(STATES.A)),
+    "cells": {"num": np.array([[0, 0, 1]], dtype=object), "den": np.array([[1, 2]], dtype=object)},
+    "nothing": {"note": "text", "other": 2.0},
+    "structures": {"s": np.array([(1, 2), (3, 4), (5, 6)], dtype=[("num", "O"), ("den", "O")])},
+    "two systems": {"s": roots(), "t": roots()},
+    "bare and structure": {"s": roots(), **roots()},
+}
+
+
+def message(folder, fields, given=GIVEN, **more):
+    with pytest.raises(ExportError) as error:
+        import_mat(save(folder, **fields), given, **more)
+    return str(error.value).replace(str(folder), "(folder)")
+
+
+def test_each_refusal_says_what_was_found_where_and_what_to_do(tmp_path):
+    assert {name: message(tmp_path, fields) for name, fields in REFUSED.items()} == {
+        "two poles coincide": (
+            "(folder)/model.mat: two poles coincide at 47.75 Hz with a damping ratio of 1; a "
+            "mirror file has no modal form for them: set them apart, or reduce the model"
+        ),
+        "a zero cancels": (
+            "(folder)/model.mat: not minimal, a zero cancels the pole at 95.49 Hz with a "
+            "damping ratio of 1; remove both (minreal)"
+        ),
+        "unstable": (
+            "(folder)/model.mat: unstable, a pole at 47.75 Hz with a damping ratio of -1; a "
+            "mirror is stable: identify it again"
+        ),
+        "an integrator": (
+            "(folder)/model.mat: an integrator, a pole at 0 Hz; a mirror comes to rest: take "
+            "drift off the records and identify again"
+        ),
+        "no conjugate": (
+            "(folder)/model.mat: p has the complex root -5+3j without its conjugate; a "
+            "mirror's response is real: give both"
+        ),
+        "falling": (
+            "(folder)/model.mat: the output falls as the drive rises, the response at "
+            "normalise_at (2 Hz) is -9.583e-08+4.016e-09j; a mirror file describes a mirror "
+            "whose angle rises with its drive: turn the sign in the model, or normalise below "
+            "the resonances if it is only their phase"
+        ),
+        "a zero at rest": (
+            "(folder)/model.mat: a zero at 0 Hz: the mirror does not hold an angle; a mirror "
+            "file has zeros above 0 Hz, so give the model with its answer to a constant drive"
+        ),
+        "no gain": "(folder)/model.mat: a gain of 0.0; the mirror does not move: check the model",
+        "gains": "(folder)/model.mat: k has 3 gains; choose one input and one output",
+        "a jump": (
+            "(folder)/model.mat: 2 zeros over 1 poles, not strictly proper; a mirror does not "
+            "follow a jump at once: add the pole that ends its band"
+        ),
+        "a matrix of roots": (
+            "(folder)/model.mat: p has shape (2, 3), not a row or a column; choose one input and one output"
+        ),
+        "channels": ("(folder)/model.mat: 2 inputs and 3 outputs; a mirror file has one drive and one angle: choose"),
+        "shapes": "(folder)/model.mat: D has shape (1, 2), where (1, 1) fits the others",
+        "hidden": (
+            "(folder)/model.mat: not minimal, it has a mode that no input drives: 3.183 Hz "
+            "with a damping ratio of 1. Zeros, poles and coefficients would hide it; take the "
+            "state space, or a minimal realisation of it (minreal)"
+        ),
+        "no time": (
+            "(folder)/model.mat: sampled, Ts = -0.5 s, which is no time; give the sample time "
+            "in s, or Ts = 0 if it is continuous"
+        ),
+        "the band": (
+            "(folder)/model.mat: the band ends at 5000 Hz, and a model that is sampled at Ts = "
+            "0.004 s says nothing beyond 125 Hz; give the band that it was identified in"
+        ),
+        "a whole sample": (
+            "(folder)/model.mat: a pole at 0, a delay of a whole sample, which no continuous "
+            "model of finite order has; take the delay off the model, and count it in "
+            "fine_pointing.delay"
+        ),
+        "sampled unstable": (
+            "(folder)/model.mat: unstable, a pole at |z| = 1.25 at 0 Hz; a mirror comes to rest: identify it again"
+        ),
+        "sampled integrator": (
+            "(folder)/model.mat: an integrator, a pole at |z| = 1 at 0 Hz; a mirror comes to rest: identify it again"
+        ),
+        "sampled alike": (
+            "(folder)/model.mat: two poles coincide, |z| = 0.25 at 0 Hz; set them apart, or reduce the model"
+        ),
+        "sampled sign": (
+            "(folder)/model.mat: a pole on the negative real axis, |z| = 0.4 at 2.5e+04 Hz, "
+            "turns its sign each sample, and no continuous mode does so alone; reduce the "
+            "model, or identify it at a higher rate"
+        ),
+        "sampled jump": (
+            "(folder)/model.mat: 2 zeros over 2 poles, its output follows the drive within a "
+            "sample, and that of a mirror behind a hold does not (D = 0); read the output "
+            "ahead of the drive"
+        ),
+        "sampled near": (
+            "(folder)/model.mat: held and sampled at Ts = 2e-05 s again, no continuous model "
+            "gives it within 1e-09: poles that nearly coincide at this rate; convert it where "
+            "it was made (d2c in MATLAB), or sample it more slowly"
+        ),
+        "an input": (
+            "(folder)/model.mat: its input is in rad, and a mirror's drive is in V; choose the one from drive to angle"
+        ),
+        "no denominator": "(folder)/model.mat: the denominator is zero; save one with a coefficient other than 0",
+        "no numerator": "(folder)/model.mat: the numerator is zero, so the mirror does not move; check the model",
+        "an order": "(folder)/model.mat: order 63, and a mirror has at most 60; reduce the model (balred)",
+        "complex numbers": (
+            "(folder)/model.mat: den holds complex numbers; a mirror's response to a real drive is real: save it real"
+        ),
+        "not finite": (
+            "(folder)/model.mat: C holds a number that is not finite or beyond 1e+100; look for NaN or Inf in the model"
+        ),
+        "text": "(folder)/model.mat: C is not a matrix of numbers; save numbers",
+        "sparse": "(folder)/model.mat: A is a sparse matrix; save it as full",
+        "cells": "(folder)/model.mat: num has cells for 3 entries; choose one input and one output",
+        "nothing": (
+            "(folder)/model.mat has no linear system; it holds note, other, and none with A B "
+            "C D, z p k or num den: save one of these forms"
+        ),
+        "structures": "(folder)/model.mat: variable 's' is an array of 3 structures; save one of them",
+        "two systems": "(folder)/model.mat holds 2 systems, 's', 't'; choose one by its name",
+        "bare and structure": "(folder)/model.mat holds 2 systems, '', 's'; choose one by its name ('' has no structure)",
+    }
+
+
+def test_a_system_that_is_not_there_is_refused_with_those_that_are(tmp_path):
+    assert [
+        message(tmp_path, {"s": roots(), "t": roots()}, variable="u"),
+        message(tmp_path, {"s": 1.0, "t": "text"}, variable="s"),
+        message(tmp_path, {"s": roots()}, variable=""),
+    ] == [
+        "(folder)/model.mat has no system 'u'; it has 's', 't'; choose one of these",
+        (
+            "(folder)/model.mat has no system 's'; it holds s, t, and none with A B C D, z p k "
+            "or num den: save one of these forms"
+        ),
+        "(folder)/model.mat has no system ''; it has 's'; choose one of these",
+    ]
+
+
+def test_each_number_given_wrongly_is_refused_with_its_value(tmp_path):
+    changes = [
+        {"normalise_at_hz": 4e4},
+        {"excited_from_hz": 700.0, "excited_to_hz": 90.0},
+        {"output_unit": "deg"},
+        {"rate_limit_v_s": math.inf},
+        {"drive_max_v": math.nan},
+        {"name": "\t"},
+    ]
+    fields = roots(poles=[-500.0, -200.0], zeros=[])
+    assert [message(tmp_path, fields, replace(UNLIKE, **each)) for each in changes] == [
+        (
+            "(folder)/model.mat: the gain is taken at 40000 Hz (normalise_at), which is not in "
+            "the band of 0.75 Hz to 400 Hz that the model was identified in; give a frequency "
+            "inside it"
+        ),
+        "(folder)/model.mat: the band begins at 700 Hz and ends at 90 Hz; give its lower end first",
+        "(folder)/model.mat: output_unit = 'deg' is none of rad, mrad, urad; give one of them",
+        "(folder)/model.mat: rate_limit_v_s = inf is not finite; give a number",
+        "(folder)/model.mat: drive_max_v = nan is not finite; give a number",
+        ("(folder)/model.mat: the mirror has no name; give one, it stands in the mirror file and in the report"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (PermissionError(13, "Permission denied"), "cannot be read (Permission denied); check the path"),
+        (OSError("no more"), "cannot be read (no more); check the path"),
+        (matlab.MatlabFileError("it ends early"), "is no MATLAB file that can be read: it ends early. Save it again"),
+    ],
+)
+def test_a_file_that_breaks_off_is_refused_with_what_broke(raised, said, tmp_path, monkeypatch):
+    def broken(*args, **more):
+        raise raised
+
+    path = save(tmp_path, **roots())
+    monkeypatch.setattr(matlab, "MatlabFile", broken)
+    with pytest.raises(ExportError, match=re.escape(f"{path} {said}")) as error:
+        import_mat(path, GIVEN)
+    assert error.value.__cause__ is raised
+
+
+def test_pairs_of_roots_find_their_own_conjugates_among_others():
+    found = np.array([1 - 2j, -3.0, 1 + 2.5j, 1 + 2j, 4.0 + 1e-20j, 1 - 2.5j])
+    made = roots_module.paired(found, "p", "a source")
+    assert made.tolist() == [-3.0, 4.0, 1 + 2.5j, 1 - 2.5j, 1 + 2j, 1 - 2j]
+    for lone, named in ((np.array([1 + 2j, 1 - 2j, 5 - 1j]), "5-1j"), (np.array([5 + 1j, 1 - 2j]), "5+1j")):
+        with pytest.raises(ExportError, match=re.escape(f"z has the complex root {named} without its conjugate")):
+            roots_module.paired(lone, "z", "a source")
+
+
+def test_the_response_of_a_sampled_system_is_taken_on_the_circle():
+    of = roots_module.Roots(np.array([0.5 + 0j]), np.array([0.25 + 0.5j, 0.25 - 0.5j]), 3.0, 0.125)
+    freq = np.array([0.5, 1.5])
+    z = np.exp(2j * np.pi * freq * 0.125)
+    wanted = 3.0 * (z - 0.5) / (z**2 - 0.5 * z + 0.3125)
+    np.testing.assert_allclose(roots_module.response(of, freq), wanted, rtol=1e-12)
+    continuous = replace(of, period_s=0.0)
+    s = 2j * np.pi * freq
+    np.testing.assert_allclose(
+        roots_module.response(continuous, freq), 3.0 * (s - 0.5) / (s**2 - 0.5 * s + 0.3125), rtol=1e-12
+    )
+
+
+def test_a_first_order_model_behind_a_hold_is_found_in_closed_form():
+    sampled = roots_module.Roots(np.zeros(0), np.array([0.8 + 0j]), 0.5, 0.01)
+    found = hold.without_hold(sampled, "a source")
+    rate = -math.log(0.8) / 0.01
+    assert (found.zeros.size, found.period_s) == (0, 0.0)
+    assert (found.poles[0].real, found.gain) == (pytest.approx(-rate), pytest.approx(0.5 / 0.2 * rate))
