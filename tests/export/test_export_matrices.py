@@ -6,6 +6,7 @@ import struct
 import sys
 import zlib
 from dataclasses import replace
+from fractions import Fraction
 from types import SimpleNamespace
 
 import control as python_control
@@ -15,6 +16,7 @@ from scipy.io import loadmat, savemat
 
 import designs
 import several_axes
+from drawn import plain as rounded
 from learning_loops import with_plays
 from microrad.core import lti
 from microrad.export import choice, matrices
@@ -810,3 +812,219 @@ def test_models_of_several_axes_say_the_bias_that_they_count_from_as_it_is(bias_
     rests = replace(plain, actuators=tuple(replace(each, bias_v=bias_v) for each in plain.actuators))
     found = matrices.models(choice.source(several_axes.mission(), rests))
     assert [each.meaning.rpartition(" count from rest at ")[2] for each in found] == [said] * 2
+
+
+# ------------------------------------------------------------------------------- two inputs and two outputs as a whole
+def two_by_two(period_s=0.0, **changes):
+    """Three states of which each way has its own; every number unlike the others."""
+    A = np.diag([-2.0, -5.0, -11.0]) if not period_s else np.diag([0.5, -0.25, 0.75])
+    B = np.array([[1.0, 0.0], [2.0, 3.0], [0.0, 7.0]])
+    C = np.array([[4.0, 0.0, 0.5], [1.5, -2.5, 0.0]])
+    D = np.array([[0.0, 0.125], [0.0, 0.0]])
+    given = LinearModel(
+        "two",
+        "what it is",
+        lti.StateSpace(A, B, C, D),
+        period_s,
+        (Port("a", "V"), Port("b", "V")),
+        (Port("x", "rad"), Port("y", "m")),
+        (Port("s0", "1"), Port("s1", ""), Port("s2", "rad/s")),
+        Origin("a mission", "f" * 64, "a mirror"),
+        np.array([[0.5, 1.5], [2.5, 3.5], [4.5, 5.5]]),
+    )
+    return replace(given, **changes)
+
+
+def without_numerics(entry):
+    """An entry without what only rounding decides: the error of its response, and where that is largest."""
+    return {key: value for key, value in entry.items() if key not in ("largest_error", "at_hz")}
+
+
+@pytest.mark.parametrize("period_s", [0.0, 0.01])
+def test_each_entry_of_two_by_two_has_the_roots_and_powers_of_its_own_way(period_s):
+    found = forms(two_by_two(period_s))
+    for form in (found.zero_pole_gain, found.transfer_function):
+        freq = np.array([0.03, 0.7, 30.0])
+        s = np.exp(2j * np.pi * freq * period_s) if period_s else 2j * np.pi * freq
+        exact = lti.frequency_response(two_by_two(period_s).system, freq, period_s or None)
+        for o, row in enumerate(form):
+            for i, entry in enumerate(row):
+                if hasattr(entry, "zeros"):
+                    value = matrix_forms.factored(entry.zeros, entry.poles, entry.gain, s)
+                else:
+                    value = np.polyval(entry.numerator, s) / np.polyval(entry.denominator, s)
+                np.testing.assert_allclose(value, exact[:, o, i], rtol=1e-9)
+    orders = [[len(entry.poles) for entry in row] for row in found.zero_pole_gain]
+    assert orders == [[1, 1], [2, 1]]
+
+
+def test_json_of_two_by_two_has_every_field_of_the_model():
+    (found,) = json.loads(matrices.json_text([two_by_two()]))["models"]
+    for form in ("zero_pole_gain", "transfer_function"):
+        found[form] = [[without_numerics(entry) for entry in row] for row in found[form]["entries"]]
+    assert rounded(found) == {
+        "name": "two",
+        "meaning": "what it is",
+        "mission": "a mission",
+        "mission_sha256": "ffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffff",
+        "mirror": "a mirror",
+        "Ts_s": 0.0,
+        "inputs": [{"name": "a", "unit": "V"}, {"name": "b", "unit": "V"}],
+        "outputs": [{"name": "x", "unit": "rad"}, {"name": "y", "unit": "m"}],
+        "states": [{"name": "s0", "unit": "1"}, {"name": "s1", "unit": ""}, {"name": "s2", "unit": "rad/s"}],
+        "A": [[-2.0, 0.0, 0.0], [0.0, -5.0, 0.0], [0.0, 0.0, -11.0]],
+        "B": [[1.0, 0.0], [2.0, 3.0], [0.0, 7.0]],
+        "C": [[4.0, 0.0, 0.5], [1.5, -2.5, 0.0]],
+        "D": [[0.0, 0.125], [0.0, 0.0]],
+        "anti_windup": [[0.5, 1.5], [2.5, 3.5], [4.5, 5.5]],
+        "zero_pole_gain": [
+            [
+                {"zeros": [], "poles": [[-2.0, 0.0]], "gain": 4.0},
+                {"zeros": [[-39.0, 0.0]], "poles": [[-11.0, 0.0]], "gain": 0.125},
+            ],
+            [
+                {"zeros": [[-0.714286, 0.0]], "poles": [[-5.0, 0.0], [-2.0, 0.0]], "gain": -3.5},
+                {"zeros": [], "poles": [[-5.0, 0.0]], "gain": -7.5},
+            ],
+        ],
+        "transfer_function": [
+            [
+                {"numerator": [4.0], "denominator": [1.0, 2.0], "condition": 1.0},
+                {"numerator": [0.125, 4.875], "denominator": [1.0, 11.0], "condition": 1.0},
+            ],
+            [
+                {"numerator": [-3.5, -2.5], "denominator": [1.0, 7.0, 10.0], "condition": 14.933},
+                {"numerator": [-7.5], "denominator": [1.0, 5.0], "condition": 1.0},
+            ],
+        ],
+    }
+
+
+def test_mat_of_two_by_two_has_each_field_in_its_own_shape(tmp_path):
+    matrices.write_mat([two_by_two(0.01), two_by_two(name="other", anti_windup=None, origin=None)], tmp_path / "m.mat")
+    found = loadmat(tmp_path / "m.mat", simplify_cells=True)
+    two, other = found["two"], found["other"]
+    assert sorted(two) == [
+        "A",
+        "B",
+        "C",
+        "D",
+        "InputName",
+        "InputUnit",
+        "L",
+        "Mirror",
+        "Mission",
+        "MissionSha256",
+        "OutputName",
+        "OutputUnit",
+        "StateName",
+        "StateUnit",
+        "Ts",
+        "den",
+        "k",
+        "meaning",
+        "num",
+        "p",
+        "tfCondition",
+        "tfError",
+        "tfErrorHz",
+        "tfRefused",
+        "z",
+        "zpkError",
+        "zpkErrorHz",
+        "zpkRefused",
+    ]
+    kept = {
+        key: two[key] for key in ("A", "B", "C", "D", "L", "Ts", "k", "meaning", "Mission", "MissionSha256", "Mirror")
+    }
+    kept |= {key: two[key].tolist() for key in ("InputName", "InputUnit", "OutputName", "OutputUnit", "StateName")}
+    assert rounded(kept) == {
+        "A": [[0.5, 0.0, 0.0], [0.0, -0.25, 0.0], [0.0, 0.0, 0.75]],
+        "B": [[1.0, 0.0], [2.0, 3.0], [0.0, 7.0]],
+        "C": [[4.0, 0.0, 0.5], [1.5, -2.5, 0.0]],
+        "D": [[0.0, 0.125], [0.0, 0.0]],
+        "L": [[0.5, 1.5], [2.5, 3.5], [4.5, 5.5]],
+        "Ts": 0.01,
+        "k": [[4.0, 0.125], [-3.5, -7.5]],
+        "meaning": "what it is",
+        "Mission": "a mission",
+        "MissionSha256": "ffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffffff",
+        "Mirror": "a mirror",
+        "InputName": ["a", "b"],
+        "InputUnit": ["V", "V"],
+        "OutputName": ["x", "y"],
+        "OutputUnit": ["rad", "m"],
+        "StateName": ["s0", "s1", "s2"],
+    }
+    assert [np.atleast_1d(two["p"][0][i]).tolist() for i in range(2)] == [[0.5], [0.75]]
+    assert (other["Ts"], other["Mission"].size, other["L"].size) == (0, 0, 0)
+    assert np.atleast_1d(other["num"][0][1]).tolist() == pytest.approx([0.125, 4.875])
+    assert np.atleast_1d(other["den"][0][1]).tolist() == [1.0, 11.0]
+    assert two["StateUnit"].tolist()[::2] == ["1", "rad/s"] and two["zpkRefused"].size == two["tfRefused"].size == 0
+
+
+def test_an_unstable_model_has_its_roots_and_the_reason_why_it_has_no_powers(tmp_path):
+    system = lti.StateSpace(np.diag([-2.0, 3.0]), np.ones((2, 1)), np.array([[1.0, 2.0]]), np.zeros((1, 1)))
+    ports = {"inputs": (Port("a", "V"),), "outputs": (Port("x", "rad"),), "states": (Port("s", "1"), Port("t", "1"))}
+    of = two_by_two(system=system, anti_windup=None, **ports)
+    found = forms(of)
+    assert found.transfer_function == (
+        "two: unstable, 0.4775 Hz with a damping ratio of -1. Coefficients would hide it; "
+        "take the state space or zeros and poles, or export a stable model"
+    )
+    ((entry,),) = found.zero_pole_gain
+    assert sorted(entry.poles.real) == pytest.approx([-2.0, 3.0]) and entry.gain == 3.0
+    hidden = replace(of, system=replace(system, C=np.array([[1.0, 0.0]])))
+    assert forms(hidden).zero_pole_gain == forms(hidden).transfer_function
+    assert forms(hidden).zero_pole_gain == (
+        "two: not minimal, it has a mode that no output shows: 0.4775 Hz with a damping "
+        "ratio of -1. Zeros, poles and coefficients would hide it; take the state space, "
+        "or a minimal realisation of it (minreal)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (PermissionError(13, "Permission denied"), "could not be written (Permission denied), so nothing is"),
+        (OSError("no more room"), "could not be written (no more room), so nothing is"),
+    ],
+)
+def test_a_disk_that_takes_no_models_is_told_with_its_reason(raised, said, tmp_path, monkeypatch):
+    def broken(*args):
+        raise raised
+
+    monkeypatch.setattr(matrices_files, "write_whole", broken)
+    with pytest.raises(ExportError, match=re.escape(f"{tmp_path / 'm.mat'} {said}")):
+        matrices.write_mat([two_by_two()], tmp_path / "m.mat")
+
+
+@pytest.mark.parametrize("name", ["x" * 31, "a_1", "endx", "iff"])
+def test_names_that_begin_as_a_keyword_or_are_as_long_as_may_be_are_taken(name, tmp_path):
+    matrices.write_mat([two_by_two(name=name)], tmp_path / "m.mat")
+    assert name in loadmat(tmp_path / "m.mat")
+
+
+def test_a_state_that_is_a_combination_of_others_leaves_the_same_map():
+    """x2 = 2 x0 - x1 in each sample: its column is spread over those of the others."""
+    A = np.array([[0.5, 0.0, 0.25], [0.1, 0.3, 0.0], [0.9, -0.3, 0.5]])
+    B, C = np.array([[1.0], [4.0], [-2.0]]), np.array([[1.0, 2.0, 3.0], [0.0, 1.0, -1.0]])
+    made = structure.without_state(lti.StateSpace(A, B, C, np.zeros((2, 1))), 2, np.array([[2.0, -1.0, 0.0]]))
+    assert made.A.tolist() == [[1.0, -0.25], [0.1, 0.3]]
+    assert (made.B.tolist(), made.C.tolist()) == ([[1.0], [4.0]], [[7.0, -1.0], [-2.0, 2.0]])
+
+
+def test_copies_with_a_factor_are_read_through_the_first_of_them():
+    """x1 = 2 x0 and x3 = -x2 / 4 behind a sample; nothing reads x4."""
+    A, B = np.zeros((5, 5)), np.array([[1.0, 0.0], [2.0, 0.0], [0.0, 4.0], [0.0, -1.0], [1.0, 1.0]])
+    C = np.array([[1.0, 10.0, 0.0, 0.0, 0.0], [0.0, 0.0, 3.0, 8.0, 0.0]])
+    made = without_copies(lti.StateSpace(A, B, C, np.zeros((2, 2))))
+    assert (made.B.tolist(), made.C.tolist()) == ([[1.0, 0.0], [0.0, 4.0]], [[21.0, 0.0], [0.0, 1.0]])
+
+
+def test_roots_of_a_polynomial_with_some_at_zero_and_far_apart():
+    coefficients = [Fraction(2)]
+    for root in (Fraction(-1, 1024), Fraction(3), Fraction(-4096)):
+        coefficients = [a - root * b for a, b in zip([*coefficients, 0], [0, *coefficients], strict=True)]
+    found = matrix_forms.roots([*coefficients, Fraction(0), Fraction(0)])
+    assert sorted(found.real.tolist()) == [-4096.0, -1.0 / 1024.0, 0.0, 0.0, 3.0] and not found.imag.any()
