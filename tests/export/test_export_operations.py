@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import designs
-from microrad.core import lti
+from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
-from microrad.export.flight import c_code, fixed, operations
+from microrad.export.flight import c_code, double_run, fixed, operations, rounding
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations
 from microrad.export.flight.rounding import RoundingBound
@@ -410,3 +410,228 @@ def test_counts_add_up_and_are_said_in_words() -> None:
     assert a | b == Operations(multiplications=2, divisions=1, powers=3)
     assert (a + b).words == "3 multiplications, 1 division, 3 powers"
     assert Operations().words == "no operations"
+
+
+# ------------------------------------------------------------------------------------------ sizes unlike each other
+def unlike_law(*, power: float = 0.0, by_difference: bool = True) -> InverseLaw:
+    """Two elements, three plays and one lag, not evenly over two actuators; no number of a kind is that of another."""
+    row = [1e-4, 1e-6, 2e-5, 1e-4, 30.0, 20.0, 2e3, 1.0, 3.0, 2.0, 0.0, 30.0 / 2e-5]
+    other = [-2e-4, 3e-6, -1e-5, 2e-4, 10.0, 5.0, 1e3, 2.0, 1.0, 0.5, power, 10.0 / 1e-5]
+    return InverseLaw(
+        direct=np.array([50.0, -100.0]),
+        bouc_wen=np.array([row, other]),
+        bouc_wen_actuator=np.array([1, 0]),
+        play_threshold=np.array([0.0, 1e-4, 3e-4]),
+        play_weight=np.array([10.0, -4.0, 7.0]),
+        play_actuator=np.array([0, 1, 1]),
+        widening=np.array([[0.0, np.inf], [1e-4, 50.0]]),
+        lag_keep=np.array([0.9]),
+        lag_weight=np.array([1e-6]),
+        lag_actuator=np.array([1]),
+        by_difference=by_difference,
+    )
+
+
+def unlike_bank(*, widening: float = 1e-4, power: float = 0.0, reach: float = 4.0) -> kernels.ForwardBank:
+    """One Bouc-Wen element and two operators that drive two actuators, of one and of two plays."""
+    bouc_wen = [0.2, -1e-5, -0.25, 2e-5, 0.1, -0.025, 1500.0, 6.0, 0.02, -0.01, power, 0.4]
+    operator = [[widening, 40.0, 0.3, 0.2, -0.1, reach], [0.0, np.inf, 0.0, 0.0, 0.0, np.inf]]
+    return kernels.ForwardBank(
+        drives=np.array([[1.0, 0.5, 0.0], [0.0, -0.25, 2.0]]),
+        bouc_wen=np.array([bouc_wen]),
+        operator=np.array(operator),
+        play_threshold=np.array([0.0, 0.5, 1.5]),
+        play_weight=np.array([0.25, 0.5, -0.125]),
+        play_start=np.array([0, 1, 3]),
+        step_s=1e-3,
+    )
+
+
+def fed(bank: kernels.ForwardBank, of: InverseLaw | None = None) -> FlightController:
+    """The plain controller with a feedforward of three elements, of which each is driven by another mixture."""
+    made = plain(of)
+    s, mixing = made.system, np.array([[1.0, 0.0], [0.0, 2.0], [3.0, -1.0]])
+    C = np.vstack([s.C, 0.5 * mixing @ s.C[:2]])
+    D = np.vstack([s.D, 40.0 * mixing @ s.D[:2]])
+    return replace(made, system=lti.StateSpace(s.A, s.B, C, D), forward=bank)
+
+
+UNLIKE = {
+    "an inverse": lambda: plain(unlike_law()),
+    "an inverse with a given rate": lambda: plain(unlike_law(by_difference=False)),
+    "an inverse with an exponent": lambda: plain(unlike_law(power=0.5)),
+    "a feedforward": lambda: fed(unlike_bank()),
+    "a feedforward that neither widens nor bends": lambda: fed(unlike_bank(widening=0.0, reach=np.inf)),
+    "a feedforward with an exponent": lambda: fed(unlike_bank(power=1.0)),
+    "both": lambda: fed(unlike_bank(), unlike_law()),
+    "neither": lambda: plain(None),
+    "neither, without a converter": lambda: plain(None, 0.0),
+}
+
+
+def test_each_part_of_a_controller_costs_its_own_operations() -> None:
+    found = {
+        f"{name}, {precision}": operations.operations(make(), sections(make()), precision).words
+        for name, make in UNLIKE.items()
+        for precision in ("double", "single")
+    }
+    assert found == {
+        "an inverse, double": (
+            "65 multiplications, 70 additions, 18 divisions, 112 comparisons, 8 exponentials, 2 logarithms, 2 roundings"
+        ),
+        "an inverse, single": (
+            "64 multiplications, 80 additions, 18 divisions, 120 comparisons, 8 exponentials, 2 logarithms, 2 roundings"
+        ),
+        "an inverse with a given rate, double": (
+            "67 multiplications, 70 additions, 16 divisions, 120 comparisons, 8 exponentials, 2 logarithms, 2 roundings"
+        ),
+        "an inverse with a given rate, single": (
+            "66 multiplications, 80 additions, 16 divisions, 128 comparisons, 8 exponentials, 2 logarithms, 2 roundings"
+        ),
+        "an inverse with an exponent, double": (
+            "14139 multiplications, 9027 additions, 1039 divisions, 3178 comparisons, 6 "
+            "exponentials, 1 logarithm, 2048 powers, 2 roundings"
+        ),
+        "an inverse with an exponent, single": (
+            "14138 multiplications, 9037 additions, 1039 divisions, 3186 comparisons, 6 "
+            "exponentials, 1 logarithm, 2048 powers, 2 roundings"
+        ),
+        "a feedforward, double": (
+            "66 multiplications, 67 additions, 11 divisions, 96 comparisons, 4 exponentials, 1 logarithm, 2 roundings"
+        ),
+        "a feedforward, single": (
+            "65 multiplications, 74 additions, 11 divisions, 102 comparisons, 4 exponentials, 1 logarithm, 2 roundings"
+        ),
+        "a feedforward that neither widens nor bends, double": (
+            "54 multiplications, 57 additions, 7 divisions, 81 comparisons, 4 exponentials, 1 logarithm, 2 roundings"
+        ),
+        "a feedforward that neither widens nor bends, single": (
+            "53 multiplications, 64 additions, 7 divisions, 87 comparisons, 4 exponentials, 1 logarithm, 2 roundings"
+        ),
+        "a feedforward with an exponent, double": (
+            "14140 multiplications, 9024 additions, 1032 divisions, 3162 comparisons, 2 "
+            "exponentials, 2048 powers, 2 roundings"
+        ),
+        "a feedforward with an exponent, single": (
+            "14139 multiplications, 9031 additions, 1032 divisions, 3168 comparisons, 2 "
+            "exponentials, 2048 powers, 2 roundings"
+        ),
+        "both, double": (
+            "115 multiplications, 119 additions, 27 divisions, 170 comparisons, 12 "
+            "exponentials, 3 logarithms, 2 roundings"
+        ),
+        "both, single": (
+            "114 multiplications, 129 additions, 27 divisions, 178 comparisons, 12 "
+            "exponentials, 3 logarithms, 2 roundings"
+        ),
+        "neither, double": "16 multiplications, 18 additions, 2 divisions, 38 comparisons, 2 roundings",
+        "neither, single": "15 multiplications, 25 additions, 2 divisions, 44 comparisons, 2 roundings",
+        "neither, without a converter, double": "14 multiplications, 16 additions, 34 comparisons",
+        "neither, without a converter, single": "13 multiplications, 23 additions, 40 comparisons",
+    }
+
+
+def test_each_part_beside_fixed_point_costs_its_own_operations() -> None:
+    found = {}
+    for name in ("an inverse with a given rate", "a feedforward", "neither, without a converter"):
+        of = UNLIKE[name]()
+        made = fixed.quantised(of, sections(of), run_of(of), 24, beyond_a_count=True)
+        found[name] = operations.fixed_operations(of, made).words
+    assert found == {
+        "an inverse with a given rate": (
+            "19 multiplications, 38 additions, 37 shifts, 95 comparisons of whole numbers; 6 "
+            "conversions; in single precision 57 multiplications, 59 additions, 14 divisions, "
+            "102 comparisons, 8 exponentials, 2 logarithms, 2 roundings"
+        ),
+        "a feedforward": (
+            "26 multiplications, 44 additions, 35 shifts, 79 comparisons of whole numbers; 5 "
+            "conversions; in single precision 47 multiplications, 45 additions, 9 divisions, "
+            "88 comparisons, 4 exponentials, 1 logarithm, 2 roundings"
+        ),
+        "neither, without a converter": "13 multiplications, 26 additions, 25 shifts, 61 comparisons of whole numbers",
+    }
+
+
+@pytest.mark.parametrize("name", [name for name in UNLIKE if name not in ("both", "neither, without a converter")])
+def test_what_the_templates_get_has_each_number_of_its_own_part(name: str) -> None:
+    of = UNLIKE[name]()
+    found = c_code._values(of, sections(of), "unlike", "single")
+    assert (found["elements"], found["plays"], found["lags"]) == ((2, 3, 1) if "inverse" in name else (0, 0, 0))
+    forward = (3, 1, 2, 3) if "feedforward" in name else (0, 0, 0, 0)
+    assert tuple(found[f"forward_{key}"] for key in ("count", "elements", "operators", "plays")) == forward
+    if "feedforward" in name:
+        plain_bank = "neither" in name
+        assert (found["forward_widens"], found["forward_bends"]) == (not plain_bank, not plain_bank)
+        assert found["forward_reach"].tolist() == [1.0 if plain_bank else 4.0, 1.0]
+        assert found["forward_polynomial"].tolist() == [[0.3, 0.2, -0.1], [0.0, 0.0, 0.0]]
+        assert found["rows"] == "v (V) 0 to 1, drive of each element 2 to 4"
+    elif "inverse" in name:
+        rate = ", rate of the target (rad/s) 4 to 5" if "given" in name else ""
+        assert found["rows"] == f"v (V) 0 to 1, target (rad) 2 to 3{rate}"
+        assert found["widening"] and found["uses_rate"] and found["direct"]
+    assert found["bound_share"] == (c_code.POWER_BOUND_SHARE if "exponent" in name else c_code.BOUND_SHARE)
+    assert (found["readings"], found["outputs"]) == (sum(s.size for s in of.inputs), len(of.system.C))
+    assert found["all_compensated"] is False and sum(found["compensated"]) == 2
+
+
+@pytest.mark.parametrize("name", ["an inverse", "a feedforward", "both", "an inverse with an exponent"])
+def test_a_run_in_double_of_unlike_parts_is_clipped_where_limits_are(name: str) -> None:
+    of = replace(UNLIKE[name](), minimum_v=-0.004, maximum_v=0.003)
+    inputs = 0.3 * swinging(of)[1500:1900] * np.linspace(0.5, 1.5, swinging(of).shape[1])
+    run = double_run.run_in_double(of, sections(of), inputs)
+    command = np.clip(run.free, -0.004, 0.003)
+    np.testing.assert_allclose(run.excess, command - run.free, rtol=0, atol=1e-15)
+    assert np.any(run.excess > 0.0) and np.any(run.excess < 0.0)
+    form = sections(of)
+    moved = run.states[:-1] @ form.A.T + inputs[:-1] @ form.B.T + run.excess[:-1] @ form.L.T
+    np.testing.assert_allclose(run.states[1:], moved, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(run.outputs, run.states @ form.C.T + inputs @ form.D.T, rtol=1e-12, atol=1e-12)
+    added = run.free - run.outputs[:, :2]
+    wanted = 0.0 if run.inverse is None else run.inverse.added
+    wanted = wanted + (0.0 if run.forward is None else run.forward.z @ of.forward.drives.T)
+    np.testing.assert_allclose(added, wanted, rtol=1e-9, atol=1e-12)
+
+
+def by_hand(bank: kernels.ForwardBank, q: Floats) -> Floats:
+    """What the two operators of `unlike_bank` put out, written out for each of them."""
+    quadratic, signed, cubic, reach = bank.operator[0].tolist()[2:]
+    plays, found = np.zeros(3), np.zeros((len(q), 2))
+    for k, (one, two) in enumerate(q.tolist()):
+        plays[0] = one  # of no threshold, which no rate widens
+        plays[1] = max(two - 0.5, min(two + 0.5, plays[1]))
+        plays[2] = max(two - 1.5, min(two + 1.5, plays[2]))
+        s = max(-1.0, min(1.0, one / reach))
+        bent = quadratic * s * s + signed * s * abs(s) + cubic * s**3
+        found[k] = 0.25 * plays[0] + bent, 0.5 * plays[1] - 0.125 * plays[2]
+    return found
+
+
+def test_operators_of_a_feedforward_have_each_their_own_plays_and_polynomial() -> None:
+    bank = unlike_bank()
+    k = np.arange(300.0)
+    q = np.stack([np.zeros(300), 5.0 * np.sin(0.07 * k), 3.0 * np.sin(0.05 * k) + np.cos(0.3 * k)], axis=1)
+    forward = double_run.Forward(bank, len(q))
+    added = np.array([forward.step(row) for row in q])
+    np.testing.assert_allclose(forward.record.z[:, 1:], by_hand(bank, q[:, 1:]), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(added, forward.record.z @ bank.drives.T, rtol=1e-12)
+    np.testing.assert_allclose(forward.record.q, q)
+
+
+def test_single_precision_costs_each_part_its_own_error() -> None:
+    found = {}
+    for name, make in UNLIKE.items():
+        of = make()
+        run = Vectors(0.1 * swinging(of)[500:900], np.zeros((400, 2)), 0, 0)
+        ahead = rounding.errors_before_converter(of, sections(of), run)
+        found[name] = [float(f"{each:.4g}") for each in (*ahead[100], *ahead.max(axis=0))]
+    assert found == {
+        "an inverse": [2.686e-06, 1.909e-06, 2.988e-06, 2.487e-06],
+        "an inverse with a given rate": [2.689e-06, 1.913e-06, 2.996e-06, 2.497e-06],
+        "an inverse with an exponent": [2.719e-06, 1.909e-06, 3.003e-06, 2.487e-06],
+        "a feedforward": [1.089e-06, 7.461e-07, 1.108e-06, 7.553e-07],
+        "a feedforward that neither widens nor bends": [1.089e-06, 7.461e-07, 1.108e-06, 7.553e-07],
+        "a feedforward with an exponent": [1.097e-06, 7.461e-07, 1.151e-06, 7.553e-07],
+        "both": [3.775e-06, 2.655e-06, 4.09e-06, 3.242e-06],
+        "neither": [7.114e-10, 1.14e-10, 2.74e-09, 2.031e-10],
+        "neither, without a converter": [7.114e-10, 1.14e-10, 2.74e-09, 2.031e-10],
+    }

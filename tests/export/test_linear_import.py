@@ -763,7 +763,9 @@ def test_each_refusal_says_what_was_found_where_and_what_to_do(tmp_path):
         ),
         "structures": "(folder)/model.mat: variable 's' is an array of 3 structures; save one of them",
         "two systems": "(folder)/model.mat holds 2 systems, 's', 't'; choose one by its name",
-        "bare and structure": "(folder)/model.mat holds 2 systems, '', 's'; choose one by its name ('' has no structure)",
+        "bare and structure": (
+            "(folder)/model.mat holds 2 systems, '', 's'; choose one by its name ('' has no structure)"
+        ),
     }
 
 
@@ -811,7 +813,7 @@ def test_each_number_given_wrongly_is_refused_with_its_value(tmp_path):
     [
         (PermissionError(13, "Permission denied"), "cannot be read (Permission denied); check the path"),
         (OSError("no more"), "cannot be read (no more); check the path"),
-        (matlab.MatlabFileError("it ends early"), "is no MATLAB file that can be read: it ends early. Save it again"),
+        (matlab.MatlabFileError("it ends early"), "is no MATLAB file that can be read: it ends early. Save"),
     ],
 )
 def test_a_file_that_breaks_off_is_refused_with_what_broke(raised, said, tmp_path, monkeypatch):
