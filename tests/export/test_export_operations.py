@@ -586,6 +586,14 @@ def test_a_run_in_double_of_unlike_parts_is_clipped_where_limits_are(name: str) 
     moved = run.states[:-1] @ form.A.T + inputs[:-1] @ form.B.T + run.excess[:-1] @ form.L.T
     np.testing.assert_allclose(run.states[1:], moved, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(run.outputs, run.states @ form.C.T + inputs @ form.D.T, rtol=1e-12, atol=1e-12)
+    if run.forward is not None:
+        np.testing.assert_allclose(run.forward.q, run.outputs[:, -3:], rtol=1e-12)
+    if run.inverse is not None:
+        creep = run.inverse.lag * of.inverse.lag_weight  # of the second actuator
+        target = run.inverse.target + np.hstack([np.zeros_like(creep), creep])
+        np.testing.assert_allclose(target, run.outputs[:, 2:4], rtol=1e-12, atol=1e-15)
+        rate = np.diff(run.inverse.target, axis=0, prepend=0.0) / of.period_s
+        np.testing.assert_allclose(run.inverse.rate, rate, rtol=1e-9, atol=1e-12)
     added = run.free - run.outputs[:, :2]
     wanted = 0.0 if run.inverse is None else run.inverse.added
     wanted = wanted + (0.0 if run.forward is None else run.forward.z @ of.forward.drives.T)

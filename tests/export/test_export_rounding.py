@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import designs
+from drawn import plain as six_digits
 from microrad.core import kernels, lti
 from microrad.core.kernels.loop import inverse_drive
 from microrad.export.flight import double_run, rounding
@@ -515,3 +516,169 @@ def test_a_spring_that_softens_errs_in_a_feedforward_as_one_that_hardens_does(po
     assert np.all(wrong <= ahead)
     assert np.max(wrong) > 1e-8
     assert ahead == pytest.approx(ahead_of(tuple(-each for each in powers)), rel=1e-9, abs=0.0)
+
+
+# ------------------------------------------------------------------------------------------------ errors part by part
+def unlike_bank(**changes):
+    """One Bouc-Wen element and two operators, of one and of two plays; the first widens and bends."""
+    given = {
+        "drives": np.array([[1.0, 0.5, 0.0], [0.0, -0.25, 2.0]]),
+        "bouc_wen": np.array([[0.2, -1e-3, -0.25, 2e-3, 0.1, -0.025, 150.0, 6.0, 0.02, -0.01, 0.0, 0.4]]),
+        "operator": np.array([[1e-2, 40.0, 0.3, 0.2, -0.1, 4.0], [0.0, np.inf, 0.0, 0.0, 0.0, np.inf]]),
+        "play_threshold": np.array([0.25, 0.5, 1.5]),
+        "play_weight": np.array([0.25, 0.5, -0.125]),
+        "play_start": np.array([0, 1, 3]),
+        "step_s": 1e-2,
+    }
+    return kernels.ForwardBank(**given | changes)
+
+
+Q = np.array([0.0, 0.5, 1.5, 1.0, -2.0, 6.0])
+TRAVEL = np.diff(Q, prepend=0.0)
+RATE_ERROR, Q_ERROR = np.linspace(0.25, 1.5, 6), np.array([0.125, 0.25, 0.0625, 0.5, 0.03125, 0.75])
+
+
+def test_errors_of_operators_have_those_of_their_plays_widening_and_polynomial():
+    found = [
+        rounding._operator_errors(unlike_bank(), o, np.abs(TRAVEL) / 1e-2, Q, TRAVEL, RATE_ERROR, Q_ERROR)
+        for o in (0, 1)
+    ]
+    assert six_digits(found) == [
+        [0.0323633, 0.0738088, 0.070391, 0.168907, 0.132023, 0.45258],
+        [0.0781254, 0.156251, 0.156251, 0.312501, 0.312501, 0.468753],
+    ]
+
+
+def test_errors_of_a_memory_are_its_own_where_a_drive_may_have_turned():
+    row = unlike_bank().bouc_wen[0].copy()
+    with_power = row.copy()
+    with_power[kernels.POWER] = 0.5
+    h = np.array([0.0, -0.125, -0.25, -0.1, 0.3, -0.75])
+    found = [
+        rounding._element_errors(each, 1e-2, h, Q, TRAVEL, 1e-3 * RATE_ERROR, 1e-3 * Q_ERROR)
+        for each in (row, with_power)
+    ]
+    assert six_digits(found) == [
+        [5.76229e-05, 0.00012406, 4.85934e-05, 0.000254196, 6.34234e-05, 0.000420927],
+        [5.76229e-05, 0.000126994, 4.98863e-05, 0.000253415, 7.32148e-05, 0.000468915],
+    ]
+
+
+def test_errors_of_a_feedforward_go_to_the_actuators_that_its_elements_drive():
+    q = np.stack([Q, Q[::-1], 0.5 * Q], axis=1)
+    z, h = 0.25 * q, np.array([[0.0, -0.125, -0.25, -0.1, 0.3, -0.75]]).T
+    error = np.stack([1e-3 * Q_ERROR, 2e-3 * Q_ERROR, 4e-3 * Q_ERROR], axis=1)
+    found = rounding._forward_errors(unlike_bank(), double_run.ForwardRun(q, h, z), error)
+    assert six_digits(found) == [
+        [0.00017709, 0.000678114],
+        [0.000377928, 0.00134756],
+        [0.000288491, 0.00133199],
+        [0.000688472, 0.00266049],
+        [0.000542263, 0.00263522],
+        [0.00150541, 0.00394622],
+    ]
+
+
+def inverse_run():
+    """Two actuators, one element, one lag, six samples."""
+    target = np.stack([1e-4 * Q, -2e-4 * Q[::-1]], axis=1)
+    rate = np.diff(target, axis=0, prepend=0.0) / PERIOD_S
+    travel, h = 10.0 * target[:, :1], 0.1 * target[:, :1]
+    return double_run.InverseRun(target, rate, travel, h, 5.0 * target[:, 1:], 100.0 * target)
+
+
+def unlike_law():
+    return replace(
+        law((STEEP,), plays=((0.0, 900.0), (2e-5, -500.0), (1e-4, -200.0)), creep=((2e-6, 0.01),)),
+        direct=np.array([300.0, -700.0]),
+        play_actuator=np.array([1, 0, 1]),
+        widening=np.array([[1e-3, 0.02], [2e-3, 0.05]]),
+        lag_actuator=np.array([1]),
+    )
+
+
+def test_errors_of_an_inverse_belong_to_its_targets_rates_plays_and_lags():
+    run, of = inverse_run(), unlike_law()
+    error = np.stack([1e-9 * Q_ERROR, 3e-9 * Q_ERROR], axis=1)
+    lag = 1e-3 * np.linspace(1.0, 2.0, 6)[:, None]
+    target = rounding._target_errors(of, run, error, lag)
+    controller = SimpleNamespace(inverse=of, actuators=2, period_s=PERIOD_S)
+    rate = rounding._rate_errors(controller, run, target, np.zeros((6, 6)))
+    added = np.zeros((6, 2))
+    rounding._add_play_errors(of, run, target, rate, added)
+    element = rounding._bouc_wen_errors(of.bouc_wen[0], run, 0, 1, target[:, 1], rate[:, 1])
+    lags = rounding._lag_errors(of, run, 1e-3 * added + 1e-6)
+    assert six_digits([target, rate, added, element, lags]) == [
+        [
+            [1.25e-10, 2.51806e-09],
+            [2.5596e-10, 3.19769e-09],
+            [8.03814e-11, 3.01134e-09],
+            [5.11921e-10, 4.73576e-09],
+            [5.50919e-11, 3.70567e-09],
+            [8.21526e-10, 6.25e-09],
+        ],
+        [
+            [6.25e-07, 1.40208e-05],
+            [1.96441e-06, 3.04861e-05],
+            [1.80092e-06, 3.17604e-05],
+            [3.02112e-06, 3.88547e-05],
+            [3.19269e-06, 4.24456e-05],
+            [5.33676e-06, 4.98976e-05],
+        ],
+        [
+            [3.80364e-07, 9.10774e-06],
+            [1.13432e-06, 1.59694e-05],
+            [1.14326e-06, 1.63882e-05],
+            [1.80407e-06, 2.09497e-05],
+            [1.81301e-06, 2.21264e-05],
+            [3.2508e-06, 2.68555e-05],
+        ],
+        [5.59149e-05, 6.83177e-05, 8.7543e-05, 0.00011978, 0.000128002, 0.000343095],
+        [[0.0], [2.11714e-08], [4.12662e-08], [6.07732e-08], [8.00834e-08], [9.88363e-08]],
+    ]
+    given = SimpleNamespace(inverse=replace(of, by_difference=False), actuators=2, period_s=PERIOD_S)
+    outputs = np.arange(36.0).reshape(6, 6)
+    assert rounding._rate_errors(given, run, target, outputs).tolist() == outputs[:, 4:6].tolist()
+
+
+@pytest.mark.parametrize(
+    ("resolution_v", "low_v", "high_v", "error_v", "found", "end_v"),
+    [
+        (0.0, -2.0, 3.0, [0.5, 7.0], [0.5, 5.0], 3.0),
+        (0.0, -3.5, 3.0, [0.5], [0.5], 3.5),
+        (0.25, -2.0, 3.0, [0.0, 0.3, 0.25], [0.25, 0.5, 0.5], 3.0),
+        (0.25, -math.inf, math.inf, [1.1, math.inf], [1.25, 0.25 * (1e9 + 1.0)], 0.0),
+        (0.1, -0.05, 0.02, [0.0], [0.07], 0.05),
+    ],
+)
+def test_an_error_behind_a_converter_is_so_many_counts_within_the_limits(
+    resolution_v, low_v, high_v, error_v, found, end_v
+):
+    of = SimpleNamespace(resolution_v=resolution_v, minimum_v=low_v, maximum_v=high_v)
+    wanted = np.minimum(np.array(found) + 4.0 * rounding.UNIT * end_v, high_v - low_v)
+    assert rounding.behind_converter(of, np.array(error_v)) == pytest.approx(wanted, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "numbers", "said"),
+    [
+        ({}, (0.5, 0.25, 1e-9, 77), "It stays within 0.5 V of double over these 77 samples; over the second half of"),
+        (
+            {"resolution_v": 0.125},
+            (0.5, 0.0625, 1.5e-9, 77),
+            "It stays within 0.5 V of double over these 77 samples (0.0625 V ahead of a converter of 0.125 V); over",
+        ),
+        ({}, (0.5, 5.0, 0.0, 9), "Over these 9 samples it is not bounded: errors may grow while commands are clipped."),
+    ],
+)
+def test_a_bound_is_told_with_its_samples_converter_and_growth(changes, numbers, said):
+    of = SimpleNamespace(**{"resolution_v": 0.0, "minimum_v": -2.0, "maximum_v": 3.0, "adaptation": None} | changes)
+    found = rounding._words(of, *numbers)
+    assert found.startswith(said)
+    assert found.endswith((f"that grows by {numbers[2]:.2g} V a sample.", "clipped."))
+
+
+def test_a_bound_grows_by_the_rise_of_its_second_half():
+    assert rounding._growth(np.array([1.0, 3.0, 2.0, 2.0, 7.0])) == 2.0
+    assert rounding._growth(np.array([1.0, 3.0, 2.0, 2.5])) == 0.0
+    assert rounding._growth(np.array([1.0])) == rounding._growth(np.array([1.0, math.inf])) == 0.0
