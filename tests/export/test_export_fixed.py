@@ -5,6 +5,7 @@ shows in it.
 """
 
 import math
+import re
 import shutil
 import subprocess
 import tempfile
@@ -15,9 +16,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drawn import plain as six_digits
 from export.test_export_rounding import shipped, vectors_of
 from microrad.core import lti
 from microrad.export.flight import double_run, fixed_form
+from microrad.export.flight import fixed as fixed_point
 from microrad.export.flight.c_code import vectors_text
 from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
 from microrad.export.linear_part.sections import sections
@@ -620,3 +623,242 @@ def test_the_report_measures_the_swing_of_a_rest():
     assert 0.0 < fixed.report.outputs[0].cycle_found <= fixed.report.outputs[0].cycle_bound
     fine = made(of, noise(), 32)
     assert fine.report.outputs[0].cycle_bound < 1e-4 * fixed.report.outputs[0].cycle_bound
+
+
+# --------------------------------------------------------------------------------- two commands whose numbers differ
+def two_axes(**changes):
+    """An integrator, a slow pole and a pair; two readings of unlike sizes; limits that are not alike."""
+    A = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.98, 0.0, 0.0], [0.0, 0.0, 0.7, -0.3], [0.0, 0.0, 0.3, 0.7]])
+    B = np.array([[20.0, 0.0], [0.0, 50.0], [10.0, 5.0], [0.0, 4.0]])
+    C = np.array([[1.0, 0.0, 2.0, 0.0], [0.0, 3.0, 0.0, 1.0]])
+    D = np.array([[300.0, 0.0], [100.0, 700.0]])
+    of = one_axis(A, B, C, D)
+    given = {
+        "actuators": 2,
+        "inputs": (Signal("first_rad", 1, "rad", "the first", 0.1), Signal("second_rad", 1, "rad", "the second", 0.3)),
+        "anti_windup": np.array([[0.1, 0.0], [0.0, 0.2], [0.0, 0.0], [0.05, 0.0]]),
+        "minimum_v": -3.1234,
+        "maximum_v": 5.4321,
+        "resolution_v": 0.01,
+    }
+    return replace(of, **given | changes)
+
+
+def two_readings(samples=800):
+    k = np.arange(samples)
+    return np.stack([2e-3 * np.sin(0.3 * k), 9e-3 * np.cos(0.011 * k) - 1e-3], axis=1)
+
+
+def sixteen_bits(bits=16, **changes):
+    of = two_axes(**changes)
+    return of, made(of, two_readings(), bits, beyond_a_count=True)
+
+
+def test_each_number_of_two_axes_has_its_own_scale_limit_and_converter():
+    _, fixed = sixteen_bits()
+    found = {name: getattr(fixed, name) for name in ("bits", "input_scale", "state_scale", "output_scale")}
+    found |= {"minimum": fixed.minimum, "maximum": fixed.maximum}
+    found |= {"state": fixed.state.scale, "output": fixed.output.scale, "shift": fixed.state_shift}
+    found |= {"state_values": fixed.state.value.tolist(), "output_values": fixed.output.value.tolist()}
+    found |= {"output_shift": fixed.output_shift, "converter": [six_digits(each) for each in fixed.converter]}
+    assert six_digits(found) == {
+        "bits": 16,
+        "input_scale": [21, 19],
+        "state_scale": [20, 19, 23, 20],
+        "output_scale": [10, 10],
+        "minimum": [-3198, -3198],
+        "maximum": [5562, 5562],
+        "state": [34, 32, 37, 34],
+        "output": [27, 23],
+        "shift": [14, 13, 14, 14],
+        "state_values": [
+            [-4915, -9830, 0, 0, 5120, 10240, 0, 0],
+            [1229, -2458, 0, 0, 0, 2048, 13107, 0],
+            [0, 0, 0, 0, 2560, 0, 26214, 0],
+            [0, 0, 0, -328, 0, 6400, 0, 13107],
+        ],
+        "output_values": [[4096, 0, 8192, 0, 19200, 0], [0, 256, 0, 6144, 400, 11200]],
+        "output_shift": [17, 13],
+        "converter": [
+            {"factor": 838860800, "shift": 33, "lowest": -312, "highest": 543},
+            {"factor": 838860800, "shift": 33, "lowest": -312, "highest": 543},
+        ],
+    }
+
+
+def test_the_report_of_two_axes_has_each_output_pole_and_state():
+    of, fixed = sixteen_bits()
+    report = six_digits(fixed.report)
+    report.pop("poles")
+    assert {key: value for key, value in report.items() if key != "outputs"} == {
+        "samples": 800,
+        "period_s": 0.0002,
+        "head_room_bits": [2.64782, 2.42609, 2.90956, 2.26462],
+        "error_v": 0.00315436,
+        "inverse_v": 0.0,
+        "resolution_v": 0.01,
+        "bound_v": 0.0100013,
+    }
+    rows = [[each["name"], each["unit"]] for each in report["outputs"]]
+    assert rows == [["v 0", "V"], ["v 1", "V"]] and fixed_form.output_groups(of) == (("v", "V", 2),)
+    assert [[f"{q.noise_predicted:.4g}", f"{q.noise_measured:.4g}"] for q in fixed.report.outputs] == [
+        ["0.0002963", "0.0003224"],
+        ["0.0006685", "0.0007103"],
+    ]
+    text = quantisation_text(fixed).split("\n")
+    assert text[:2] == [
+        ("Words of 16 bits, sums of 64. Ranges are at least 4 times the largest sizes in 800 recorded samples."),
+        (
+            "Commands stray from double precision by at most 0.00315 V over them, ahead of the "
+            "converter (a count is 0.01 V)."
+        ),
+    ]
+
+
+def test_the_text_of_a_report_has_each_number_under_its_heading():
+    _, fixed = sixteen_bits()
+    quality = fixed_form.OutputQuality("drive of hysteresis 1", "V", 0.01, 250.0, 2e-4, 1.5e-4, 3e-3, 2.5e-3)
+    other = replace(quality, name="v 0", response_error=0.002, at_hz=12.5, cycle_found=0.0)
+    report = fixed_form.QuantisationReport(
+        900,
+        2e-4,
+        ((0.5 + 0.5j, 0.25 + 0.5j), (1.0 + 0j, 1.0 + 0j)),
+        (other, quality),
+        (3.25, 64.0),
+        2e-3,
+        5e-5,
+        1e-2,
+        4e-2,
+    )
+    shown = replace(fixed, report=report, state_scale=(7, 9), state=replace(fixed.state, scale=(20, 31)))
+    assert quantisation_text(shown).split("\n") == [
+        ("Words of 16 bits, sums of 64. Ranges are at least 4 times the largest sizes in 900 recorded samples."),
+        (
+            "Commands stray from double precision by at most 0.002 V over them, ahead of the "
+            "converter (a count is 0.01 V)."
+        ),
+        "The feedforward, in single precision, adds up to 5e-05 V to that.",
+        "",
+        (
+            "               output    response       at  noise rms, predicted    measured  "
+            "swing at rest, most       found"
+        ),
+        (
+            "                  v 0  1.7e-02 dB  12.5 Hz            2.00e-04 V  1.50e-04 V      "
+            "     3.00e-03 V  0.00e+00 V"
+        ),
+        (
+            "drive of hysteresis 1  8.6e-02 dB   250 Hz            2.00e-04 V  1.50e-04 V      "
+            "     3.00e-03 V  2.50e-03 V"
+        ),
+        "",
+        "  pole    |z| as designed   |z| as quantised",
+        "625 Hz  0.707106781186548  0.559016994374947",
+        "  0 Hz  1.000000000000000  1.000000000000000",
+        "",
+        "state  head room  a step is  bits below",
+        "    0   3.2 bits       2^-7          13",
+        "    1    at rest       2^-9          22",
+    ]
+    plain_one = replace(report, outputs=(other,), inverse_v=2e-5, resolution_v=0.0)
+    assert quantisation_text(replace(shown, report=plain_one)).split("\n")[1:3] == [
+        "Commands stray from double precision by at most 0.002 V over them, ahead of the converter.",
+        "The inverse, in single precision, adds up to 2e-05 V to that.",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("bits", "changes", "said"),
+    [
+        (7, {}, "7 bits in fixed point: give 8 to 32 (sums have 64)"),
+        (33, {}, "33 bits in fixed point: give 8 to 32 (sums have 64)"),
+        (
+            12,
+            {"resolution_v": 1e-4},
+            "controller 'a design' in words of 12 bits commands up to (x) V off double precision over 800 samples, "
+            "more than a count of the converter (0.0001 V); give more bits (up to 32), or say that more than a count "
+            "will do",
+        ),
+    ],
+)
+def test_words_that_are_too_short_are_refused_in_all_their_words(bits, changes, said):
+    of = two_axes(**changes)
+    with pytest.raises(ExportError) as error:
+        made(of, two_readings(), bits)
+    assert re.sub(r"up to [\d.e-]+ V off", "up to (x) V off", str(error.value)) == said
+
+
+def test_a_pole_beyond_the_circle_is_refused_by_its_frequency():
+    fixed = SimpleNamespace(bits=12)
+    moved = ((0.6 + 0.79j, 0.62 + 0.8j),)
+    with pytest.raises(ExportError) as error:
+        fixed_point._refuse_poles(two_axes(), fixed, moved)
+    assert str(error.value) == (
+        "controller 'a design' in words of 12 bits: the pole of |z| = 0.992018145 at 733.1 "
+        "Hz moves to |z| = 1.012126474, and the limit is 1; give more bits (up to 32) or "
+        "less head room, or export single precision"
+    )
+    fixed_point._refuse_poles(two_axes(), fixed, ((0.6 + 0.8j, 0.6 + 0.8j), (1.0 + 0j, 1.0 + 0j)))
+
+
+def test_the_code_of_two_axes_has_each_table_and_constant():
+    of, fixed = sixteen_bits()
+    files = fixed_code(of, sections(of), fixed, "two")
+    assert sorted(files) == ["Makefile", "two_fixed.c", "two_fixed.h", "two_fixed_bench.c"]
+    header = [line for line in files["two_fixed.h"].split("\n") if line.startswith("#define")]
+    assert header == [
+        "#define TWO_FIXED_H",
+        "#define TWO_FIXED_PERIOD_S 0.0002",
+        "#define TWO_FIXED_BITS 16 /* of coefficients and signals */",
+        "#define TWO_FIXED_FIRST_RAD 0U",
+        "#define TWO_FIXED_FIRST_RAD_SIZE 1U",
+        "#define TWO_FIXED_FIRST_RAD_UNIT 4.76837158203125e-07 /* 2^-21 rad */",
+        "#define TWO_FIXED_SECOND_RAD 1U",
+        "#define TWO_FIXED_SECOND_RAD_SIZE 1U",
+        "#define TWO_FIXED_SECOND_RAD_UNIT 1.9073486328125e-06 /* 2^-19 rad */",
+        "#define TWO_FIXED_READINGS 2U",
+        "#define TWO_FIXED_V 0U",
+        "#define TWO_FIXED_V_UNIT 0.0009765625 /* 2^-10 V: v: the command */",
+        "#define TWO_FIXED_OUTPUTS 2U",
+        "#define TWO_FIXED_ACTUATORS 2U",
+        "#define TWO_FIXED_BIAS_V 0.0",
+        "#define TWO_FIXED_COMMAND_UNIT_V 0.01 /* a count of the converter */",
+        "#define TWO_FIXED_STATES 4U",
+    ]
+    source = files["two_fixed.c"]
+    tables_ = [line.strip() for line in source.split("\n") if re.match(r"\s*\{-?\d+, ", line) or "static const" in line]
+    assert tables_ == [
+        "static const whole_term WHOLE_OUTPUT_OF_STATES[] = {",
+        "{0, 0, 4096},",
+        "{0, 2, 8192},",
+        "{1, 1, 256},",
+        "{1, 3, 6144},",
+        "static const whole_term WHOLE_OUTPUT_OF_READINGS[] = {",
+        "{0, 0, 19200},",
+        "{1, 0, 400},",
+        "{1, 1, 11200},",
+        "static const whole_term WHOLE_STATE_OF_STATES[] = {",
+        "{0, 0, -4915},",
+        "{0, 1, -9830},",
+        "{1, 0, 1229},",
+        "{1, 1, -2458},",
+        "{3, 3, -328},",
+        "static const whole_term WHOLE_STATE_OF_READINGS[] = {",
+        "{0, 0, 5120},",
+        "{0, 1, 10240},",
+        "{1, 1, 2048},",
+        "{2, 0, 2560},",
+        "{3, 1, 6400},",
+        "static const whole_term WHOLE_STATE_OF_EXCESS[] = {",
+        "{1, 0, 13107},",
+        "{2, 0, 26214},",
+        "{3, 1, 13107},",
+        "static const int STATE_SHIFT[TWO_FIXED_STATES] = {14, 13, 14, 14};",
+        "static const int OUTPUT_SHIFT[TWO_FIXED_OUTPUTS] = {17, 13};",
+        "static const int64_t COMMAND_MIN[TWO_FIXED_ACTUATORS] = {-3198, -3198};",
+        "static const int64_t COMMAND_MAX[TWO_FIXED_ACTUATORS] = {5562, 5562};",
+        "static const int64_t COUNT_FACTOR[TWO_FIXED_ACTUATORS] = {838860800, 838860800};",
+        "static const int COUNT_SHIFT[TWO_FIXED_ACTUATORS] = {33, 33};",
+        "static const int64_t COUNT_MIN[TWO_FIXED_ACTUATORS] = {-312, -312};",
+        "static const int64_t COUNT_MAX[TWO_FIXED_ACTUATORS] = {543, 543};",
+    ]
