@@ -19,6 +19,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drawn import plain as rounded
 from microrad.campaign.statistics import sensitivity, tails
 from microrad.core import integrity
 from microrad.core.kept import Kept
@@ -29,15 +30,18 @@ from microrad.lab.identify.selection import warnings
 from microrad.link import gains
 from microrad.link import study as link_study
 from microrad.link.acquisition import partner_search, sequence
+from microrad.link.requirement import Requirement
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mission.file import load_link, load_mission
+from microrad.mission.model import Source
 from microrad.report import foundation, marks, registry
+from microrad.report import requirements as report_requirements
 from microrad.report.links.budgets import links_csv, links_text
 from microrad.report.links.data import links_data
 from microrad.report.links.views import links_page
 from microrad.report.registry import Quantity, Status
 from microrad.report.study import chain, words
-from microrad.report.tables import Cell, Table
+from microrad.report.tables import Cell, Table, tables_text
 from microrad.report.verification import (
     check,
     checks,
@@ -54,7 +58,7 @@ from microrad.report.verification import (
 )
 from microrad.report.verification.checks import measured
 from microrad.report.verification.evidence import Comparison, Referent
-from microrad.report.view import Points, View
+from microrad.report.view import Drawing, Points, Soft, Verbatim, Verdict, View, anchored, slug, told, views_text
 from microrad.studio.views import link as studio_link
 from microrad.study import study as mission_study
 from shipped import plain_study
@@ -1277,3 +1281,874 @@ def test_a_study_of_the_evidence_takes_the_parts_that_it_is_given(tmp_path, monk
     monkeypatch.setattr(mission_study, "run_study", lambda m, **given: (m, given))
     of = workspace.Workspace(tmp_path, None, parts)
     assert of.study == (load_mission(of.mission_path), {"parts": parts})
+
+
+# --------------------------------------------------------------------------- an installation of which each part differs
+def a_check(k, referent):
+    return check.Check(f"c{k}", f"Title {k}", referent, f"method {k}", f"source {k}", iter)
+
+
+def a_comparison(k, obtained, quantity=MARGIN):
+    return Comparison(quantity, f"figure {k}", 10.0 * k, obtained, 0.5 + k / 8.0, "dB", f"basis {k}")
+
+
+def unlike():
+    """Five checks: measured and published ones that hold, one that fails twice, one that broke, one without its data."""
+    outcomes = (
+        check.Outcome(a_check(1, Referent.MEASUREMENT), (a_comparison(1, 10.25), a_comparison(2, 20.0))),
+        check.Outcome(a_check(2, Referent.PUBLISHED), (a_comparison(3, -30.0 + 60.25, MODULUS),)),
+        check.Outcome(
+            a_check(3, Referent.INDEPENDENT), (a_comparison(4, 39.75), a_comparison(5, 51.5), a_comparison(6, -60.0))
+        ),
+        check.Outcome(a_check(4, Referent.INDEPENDENT), (), trouble="it broke"),
+        check.Outcome(a_check(5, Referent.MEASUREMENT), (), absent="the record is not here"),
+    )
+    kinds = (Status.VALIDATED, Status.VERIFIED, Status.VERIFIED, Status.TRACED, Status.NONE, Status.FAILED)
+    standings = tuple(
+        findings.Standing(
+            Quantity(f"q{k}", ("Links", "Loops")[k % 2], (f"q{k}",), f"s{k}"), status, (f"c{k}", "c9")[:k]
+        )
+        for k, status in enumerate(kinds)
+    )
+    extents = {
+        "a.b": {"least": 0.5, "most": 2500.0, "unit": "m"},
+        "c": {"least": 1e-6, "most": 3e-6, "unit": "rad"},
+    }
+    domain = {"extents": extents, "inside": 17, "draws": 20, "checks": ["c1", "c3"]}
+    ends = {"drive": "V", "frequency": "Hz", "rate": "Hz", "position": "m"}
+    record = {
+        "part": "the mirror",
+        "inputs": 1,
+        "outputs": 2,
+        "records": ["r1", "r2"],
+        "extents": {
+            name: {"least": 2.0 + k, "most": 30.0 + k, "unit": unit} for k, (name, unit) in enumerate(ends.items())
+        },
+        "errors": [{"what": "axis x", "unit": "", "error": 0.0125, "allowed": 0.05}],
+    }
+    package = integrity.Integrity("commit 7", ("x.py", "y.py"), (), ("z.py",), ("numpy 9 (tested: 8)",))
+    stands = {name: ("as of the release", measured.OTHER)[k % 2] for k, name in enumerate(list(measured.SHA256)[:2])}
+    depends = {"Link margin": ["a.b"]}
+    return findings.Verification(
+        outcomes, standings, package, False, {"Part": domain}, depends, {"one": record}, stands
+    )
+
+
+def told_rows(table):
+    return [[str(cell) for cell in row] for row in table.rows]
+
+
+def test_an_installation_that_fails_in_each_way_says_so_in_each_part():
+    v = unlike()
+    assert [page.headline(v), *page.summary(v)] == [
+        (
+            "This installation does not hold: 2 of 6 comparisons are beyond their tolerance "
+            "and 1 checks did not run (c4)."
+        ),
+        (
+            "6 printed quantities are registered: 1 validated, 2 verified, 1 traced, 1 none, 1 "
+            "failed. 50 % are verified or better."
+        ),
+        "2 named comparisons are with measurements or with what others have published.",
+        ("Against the commit 7: 2 changed (x.py, y.py); 1 added (z.py). Not the tested version: numpy 9 (tested: 8)."),
+        "Not run: c5. The record is not here.",
+    ]
+    assert [v.holds, v.ok, v.founded, v.bare, len(v.named), dict(v.by_subject)] == [
+        False,
+        False,
+        0.5,
+        ["q4"],
+        2,
+        {"Links": {"none": 1, "validated": 1, "verified": 1}, "Loops": {"failed": 1, "traced": 1, "verified": 1}},
+    ]
+    assert {status.value: count for status, count in v.counts.items()} == {
+        "validated": 1,
+        "verified": 2,
+        "traced": 1,
+        "none": 1,
+        "failed": 1,
+    }
+    names = list(v.files)
+    warned_of = [[w.letter, w.found.replace(names[1], "(other)"), w.impact] for w in warned.warnings(v)]
+    assert [each for each in warned_of if each[0] in "adf"] == [
+        [
+            "a",
+            "c3: beyond tolerance: figure 5, figure 6.",
+            ("What it compares is wrong, or the check is: quantities of status failed are not to be used."),
+        ],
+        [
+            "a",
+            (
+                "Tolerances of comparisons are the only criteria. There are none for uncertainty, "
+                "sensitivities and levels of credibility (M&S 43)."
+            ),
+            "That all comparisons hold does not say that a result is good enough for a decision.",
+        ],
+        ["d", "c4 did not run: it broke.", "What it alone compares is not founded here."],
+        [
+            "f",
+            (
+                "Against the commit 7: 2 changed (x.py, y.py); 1 added (z.py). Not the tested "
+                "version: numpy 9 (tested: 8)."
+            ),
+            "The numbers may be others than those of the release.",
+        ],
+        [
+            "f",
+            "Recordings are not at hand for c5.",
+            ("What they alone measure is not validated here; what was found at the release is told in its place."),
+        ],
+        [
+            "f",
+            "Not the recordings of the release: (other).",
+            ("What they are compared with is not what the release was; its errors and domains are not theirs."),
+        ],
+    ]
+    assert page._known(v) == [
+        "c4: it broke",
+        "c3: figure 5 is 51.5 where 50 is expected.",
+        "c3: figure 6 is −60 where 60 is expected.",
+        "Not founded: q4.",
+    ]
+
+
+def test_the_parts_of_a_verification_show_each_check_status_and_domain():
+    v = unlike()
+    assert told_rows(page._statuses(v)) == [
+        ["validated", "1", "compared with a measurement, within its tolerance"],
+        ["verified", "2", "compared with an independent method or another's published output, within its tolerance"],
+        ["traced", "1", "defined by a named source; not compared here"],
+        ["none", "1", "neither compared nor sourced"],
+        ["failed", "1", "a comparison is beyond its tolerance"],
+    ]
+    assert [[view.title, told_rows(view.blocks[0])] for view in page._by_subject(v)] == [
+        ["Links", [["q0", "validated", "", "s0"], ["q2", "verified", "c2, c9", "s2"], ["q4", "none", "c4, c9", "s4"]]],
+        [
+            "Loops",
+            [["q1", "verified", "c1", "s1"], ["q3", "traced", "c3, c9", "s3"], ["q5", "failed FAIL", "c5, c9", "s5"]],
+        ],
+    ]
+    assert [told_rows(page._evidence(v, measured=m)) for m in (True, False)] == [
+        [
+            ["c1", "Title 1", "measurement", "2 of 2 PASS", "method 1", "source 1"],
+            ["c2", "Title 2", "published output", "1 of 1 PASS", "method 2", "source 2"],
+            ["c5", "Title 5", "measurement", "not run", "method 5", "source 5"],
+        ],
+        [
+            ["c3", "Title 3", "independent method", "1 of 3 FAIL", "method 3", "source 3"],
+            ["c4", "Title 4", "independent method", "0 of 0 FAIL", "method 4", "source 4"],
+        ],
+    ]
+    shown = [page._comparisons(o) for o in v.outcomes]
+    assert [[view.title, view.blocks[0], *map(told_rows, view.blocks[1:])] for view in shown] == [
+        [
+            "Evidence: c1",
+            "Title 1.",
+            [
+                ["figure 1", "10", "10.25 PASS", "0.62", "basis 1", "dB"],
+                ["figure 2", "20", "20 PASS", "0.75", "basis 2", "dB"],
+            ],
+        ],
+        ["Evidence: c2", "Title 2.", [["figure 3", "30", "30.25 PASS", "0.88", "basis 3", "dB"]]],
+        [
+            "Evidence: c3",
+            "Title 3.",
+            [
+                ["figure 4", "40", "39.75 PASS", "1", "basis 4", "dB"],
+                ["figure 5", "50", "51.5 FAIL", "1.1", "basis 5", "dB"],
+                ["figure 6", "60", "−60 FAIL", "1.2", "basis 6", "dB"],
+            ],
+        ],
+        ["Evidence: c4", "Title 4. it broke"],
+        ["Evidence: c5", "Title 5. the record is not here"],
+    ]
+    assert views_text(page._domains(v)[1:], 110).split("\n") == [
+        "Part",
+        "",
+        "17 of 20 missions; all of c1, c3 held.",
+        "",
+        " input   from     to",
+        " ───────────────────────",
+        " a.b     500 mm   2.5 km",
+        " c       1 µrad   3 µrad",
+        "",
+        "Measured: the mirror",
+        "",
+        ("Validated, on records that were held out of r1, r2: 1 drive, 2 outputs. A frequency is excited where the"),
+        "spectrum of the drive has at least a tenth of its largest line.",
+        "",
+        " measured                 from   to",
+        " ─────────────────────────────────────",
+        " amplitude of the drive   2 V    30 V",
+        " excited frequencies      3 Hz   31 Hz",
+        " sample rate              4 Hz   32 Hz",
+        " span of the position     5 m    33 m",
+        "",
+        "- axis x: 1.25 % (5 % allowed).",
+        "",
+        "Links, loops and days have no domain of validation: none was compared with one that flew.",
+    ]
+    assert "at the release; microrad verify --full" in page._domains(v)[0]
+    assert "Swept in this run." in page._domains(replace(v, full=True))[0]
+
+
+def test_the_data_of_a_verification_have_each_number_under_its_own_name():
+    v = unlike()
+    found = page.verification_data(v)
+    static = ("purpose", "uses", "limits", "decides", "requirements", "assumptions", "uncertainty", "risks", "warnings")
+    kept = {key: value for key, value in found.items() if key not in (*static, "versions", "machine", "credibility")}
+    kept["recording_files"] = [each["here"] for each in kept["recording_files"].values()]
+    assert rounded(kept) == {
+        "ok": False,
+        "headline": (
+            "This installation does not hold: 2 of 6 comparisons are beyond their tolerance "
+            "and 1 checks did not run (c4)."
+        ),
+        "summary": [
+            (
+                "6 printed quantities are registered: 1 validated, 2 verified, 1 traced, 1 none, 1 "
+                "failed. 50 % are verified or better."
+            ),
+            "2 named comparisons are with measurements or with what others have published.",
+            (
+                "Against the commit 7: 2 changed (x.py, y.py); 1 added (z.py). Not the tested "
+                "version: numpy 9 (tested: 8)."
+            ),
+            "Not run: c5. The record is not here.",
+        ],
+        "counts": {"validated": 1, "verified": 2, "traced": 1, "none": 1, "failed": 1},
+        "verified_or_better": 0.5,
+        "quantities": [
+            {"name": "q0", "subject": "Links", "status": "validated", "evidence": [], "source": "s0"},
+            {"name": "q1", "subject": "Loops", "status": "verified", "evidence": ["c1"], "source": "s1"},
+            {"name": "q2", "subject": "Links", "status": "verified", "evidence": ["c2", "c9"], "source": "s2"},
+            {"name": "q3", "subject": "Loops", "status": "traced", "evidence": ["c3", "c9"], "source": "s3"},
+            {"name": "q4", "subject": "Links", "status": "none", "evidence": ["c4", "c9"], "source": "s4"},
+            {"name": "q5", "subject": "Loops", "status": "failed", "evidence": ["c5", "c9"], "source": "s5"},
+        ],
+        "evidence": [
+            {
+                "name": "c1",
+                "title": "Title 1",
+                "with": "measurement",
+                "method": "method 1",
+                "source": "source 1",
+                "holds": True,
+                "trouble": "",
+                "absent": "",
+                "comparisons": [
+                    {
+                        "quantity": "budget.budgets.Beacon.margin_db",
+                        "what": "figure 1",
+                        "expected": 10.0,
+                        "obtained": 10.25,
+                        "tolerance": 0.625,
+                        "unit": "dB",
+                        "since": "basis 1",
+                        "holds": True,
+                    },
+                    {
+                        "quantity": "budget.budgets.Beacon.margin_db",
+                        "what": "figure 2",
+                        "expected": 20.0,
+                        "obtained": 20.0,
+                        "tolerance": 0.75,
+                        "unit": "dB",
+                        "since": "basis 2",
+                        "holds": True,
+                    },
+                ],
+            },
+            {
+                "name": "c2",
+                "title": "Title 2",
+                "with": "published output",
+                "method": "method 2",
+                "source": "source 2",
+                "holds": True,
+                "trouble": "",
+                "absent": "",
+                "comparisons": [
+                    {
+                        "quantity": "run.x.margins.modulus",
+                        "what": "figure 3",
+                        "expected": 30.0,
+                        "obtained": 30.25,
+                        "tolerance": 0.875,
+                        "unit": "dB",
+                        "since": "basis 3",
+                        "holds": True,
+                    }
+                ],
+            },
+            {
+                "name": "c3",
+                "title": "Title 3",
+                "with": "independent method",
+                "method": "method 3",
+                "source": "source 3",
+                "holds": False,
+                "trouble": "",
+                "absent": "",
+                "comparisons": [
+                    {
+                        "quantity": "budget.budgets.Beacon.margin_db",
+                        "what": "figure 4",
+                        "expected": 40.0,
+                        "obtained": 39.75,
+                        "tolerance": 1.0,
+                        "unit": "dB",
+                        "since": "basis 4",
+                        "holds": True,
+                    },
+                    {
+                        "quantity": "budget.budgets.Beacon.margin_db",
+                        "what": "figure 5",
+                        "expected": 50.0,
+                        "obtained": 51.5,
+                        "tolerance": 1.125,
+                        "unit": "dB",
+                        "since": "basis 5",
+                        "holds": False,
+                    },
+                    {
+                        "quantity": "budget.budgets.Beacon.margin_db",
+                        "what": "figure 6",
+                        "expected": 60.0,
+                        "obtained": -60.0,
+                        "tolerance": 1.25,
+                        "unit": "dB",
+                        "since": "basis 6",
+                        "holds": False,
+                    },
+                ],
+            },
+            {
+                "name": "c4",
+                "title": "Title 4",
+                "with": "independent method",
+                "method": "method 4",
+                "source": "source 4",
+                "holds": False,
+                "trouble": "it broke",
+                "absent": "",
+                "comparisons": [],
+            },
+            {
+                "name": "c5",
+                "title": "Title 5",
+                "with": "measurement",
+                "method": "method 5",
+                "source": "source 5",
+                "holds": False,
+                "trouble": "",
+                "absent": "the record is not here",
+                "comparisons": [],
+            },
+        ],
+        "defects": [
+            "c4: it broke",
+            "c3: figure 5 is 51.5 where 50 is expected.",
+            "c3: figure 6 is −60 where 60 is expected.",
+            "Not founded: q4.",
+        ],
+        "domains": {
+            "Part": {
+                "extents": {
+                    "a.b": {"least": 0.5, "most": 2500.0, "unit": "m"},
+                    "c": {"least": 1e-06, "most": 3e-06, "unit": "rad"},
+                },
+                "inside": 17,
+                "draws": 20,
+                "checks": ["c1", "c3"],
+            }
+        },
+        "recordings": {
+            "one": {
+                "part": "the mirror",
+                "inputs": 1,
+                "outputs": 2,
+                "records": ["r1", "r2"],
+                "extents": {
+                    "drive": {"least": 2.0, "most": 30.0, "unit": "V"},
+                    "frequency": {"least": 3.0, "most": 31.0, "unit": "Hz"},
+                    "rate": {"least": 4.0, "most": 32.0, "unit": "Hz"},
+                    "position": {"least": 5.0, "most": 33.0, "unit": "m"},
+                },
+                "errors": [{"what": "axis x", "unit": "", "error": 0.0125, "allowed": 0.05}],
+            }
+        },
+        "recording_files": ["as of the release", "another one than at the release"],
+        "files": {
+            "against": "commit 7",
+            "changed": ["x.py", "y.py"],
+            "missing": [],
+            "added": ["z.py"],
+            "versions": ["numpy 9 (tested: 8)"],
+        },
+        "full": False,
+    }
+    assert [(each["name"], each["level"]) for each in found["credibility"]][:3] == [
+        (
+            "Data pedigree",
+            1,
+        ),
+        (
+            "Verification",
+            0,
+        ),
+        (
+            "Validation",
+            0,
+        ),
+    ]
+    assert json.loads(page.domains_text(v)) == {
+        "domains": {
+            "Part": {
+                "extents": {
+                    "a.b": {"least": 0.5, "most": 2500.0, "unit": "m"},
+                    "c": {"least": 1e-06, "most": 3e-06, "unit": "rad"},
+                },
+                "inside": 17,
+                "draws": 20,
+                "checks": ["c1", "c3"],
+            }
+        },
+        "statuses": {
+            "Links": {"none": 1, "validated": 1, "verified": 1},
+            "Loops": {"failed": 1, "traced": 1, "verified": 1},
+        },
+        "bare": ["q4"],
+        "recordings": {
+            "one": {
+                "part": "the mirror",
+                "inputs": 1,
+                "outputs": 2,
+                "records": ["r1", "r2"],
+                "extents": {
+                    "drive": {"least": 2.0, "most": 30.0, "unit": "V"},
+                    "frequency": {"least": 3.0, "most": 31.0, "unit": "Hz"},
+                    "rate": {"least": 4.0, "most": 32.0, "unit": "Hz"},
+                    "position": {"least": 5.0, "most": 33.0, "unit": "m"},
+                },
+                "errors": [{"what": "axis x", "unit": "", "error": 0.0125, "allowed": 0.05}],
+            }
+        },
+        "depends": {"Link margin": ["a.b"]},
+    }
+
+
+def test_a_terminal_has_each_comparison_of_the_checks_that_fail():
+    text = page.verification_text(unlike(), 100)
+    assert text.split("\n")[-22:] == [
+        (" verified    2            compared with an independent method or another's published output, within"),
+        "                          its tolerance",
+        " traced      1            defined by a named source; not compared here",
+        " none        1            neither compared nor sourced",
+        " failed      1            a comparison is beyond its tolerance",
+        "",
+        "Evidence: c3",
+        "",
+        "Title 3.",
+        "",
+        " figure     expected   obtained     within   since",
+        " ────────────────────────────────────────────────────",
+        " figure 4   40         39.75 PASS   1        basis 4",
+        "                                             unit: dB",
+        " figure 5   50         51.5 FAIL    1.1      basis 5",
+        "                                             unit: dB",
+        " figure 6   60         −60 FAIL     1.2      basis 6",
+        "                                             unit: dB",
+        "",
+        "Evidence: c4",
+        "",
+        "Title 4. it broke",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("names", "files", "said"),
+    [
+        ((0,), WHOLE, "All 2 comparisons hold in this installation."),
+        ((0, 1), WHOLE, "All 3 comparisons hold in this installation."),
+        ((0, 4, 4), WHOLE, "All 2 comparisons that were made hold in this installation; 2 checks were not run."),
+        (
+            (1, 4),
+            integrity.Integrity("commit 0", added=("a.py",)),
+            "All 1 comparisons that were made hold, but this is not the recorded installation; 1 check was not run.",
+        ),
+        ((2,), WHOLE, "This installation does not hold: 2 of 3 comparisons are beyond their tolerance."),
+        ((3, 3, 0), WHOLE, "This installation does not hold: 2 checks did not run (c4, c4)."),
+    ],
+)
+def test_the_outcome_counts_what_was_made_missed_and_left(names, files, said):
+    v = unlike()
+    shown = replace(v, outcomes=[v.outcomes[k] for k in names], integrity=files)
+    assert page.headline(shown) == said
+
+
+def test_the_band_of_a_drive_is_of_whole_periods_and_of_each_channel():
+    """700 samples with a period of 200: 600 count; the second channel has another band, and the third rests."""
+    t = np.arange(700) / 100.0
+    one, two = 3.0 + np.sin(2 * np.pi * 2.0 * t), np.sin(2 * np.pi * 4.0 * t) + 0.5 * np.sin(2 * np.pi * 10.0 * t)
+    recording = recording_of(np.column_stack([one, two, 0.0 * t]), np.column_stack([5.0 * one, two]), 100.0, 200)
+    assert rounded(recorded.extents([recording], 1e-3)) == {
+        "drive": {"unit": "V", "least": 0.0, "most": 1.458},
+        "frequency": {"unit": "Hz", "least": 2.0, "most": 10.0},
+        "rate": {"unit": "Hz", "least": 100.0, "most": 100.0},
+        "position": {"unit": "m", "least": 0.002916, "most": 0.00998},
+    }
+
+
+# ------------------------------------------------------------------------------------------- what the signs stand beside
+DOMAINS = {
+    "Loops": {"extents": {"loop.rate": {"least": 10.0, "most": 1000.0, "unit": "Hz"}}},
+    "Links": {
+        "extents": {
+            "link.range": {"least": 1e3, "most": 5e6, "unit": "m"},
+            "link.power": {"least": 0.5, "most": 2.0, "unit": "W"},
+            "link.none": {"least": 1.0, "most": 2.0, "unit": "s"},
+        }
+    },
+}
+
+
+def stated(**values):
+    return {key.replace("__", "."): Source(1, "", f'"{value}"') for key, value in values.items()}
+
+
+def test_inputs_beyond_either_end_of_two_domains_stand_by_how_far_they_are(monkeypatch):
+    monkeypatch.setattr(foundation, "shipped", lambda: {"domains": DOMAINS, "statuses": {}, "recordings": {}})
+    given = stated(loop__rate="4 kHz", link__range="50000 km", link__power="0 W", link__other="7")
+    found = foundation.placards(given)
+    assert [each.key for each in found] == ["link.power", "link.range", "loop.rate"]
+    assert [each.text for each in found] == [
+        (
+            "link.power = 0 W is below the least at which links were held against independent "
+            "methods, 500 mW. Figures that depend on it are extrapolated"
+        ),
+        (
+            "link.range = 50000 km is 10 times the largest at which links were held against "
+            "independent methods, 5000 km. Figures that depend on it are extrapolated"
+        ),
+        (
+            "loop.rate = 4 kHz is 4 times the largest at which loops were held against "
+            "independent methods, 1 kHz. Figures that depend on it are extrapolated"
+        ),
+    ]
+    view = foundation.foundation_view(given, Points([f"† {found[1].text}."]))
+    assert [list(block.lines) for block in view.blocks if isinstance(block, Points)] == [
+        [
+            (
+                "† link.range = 50000 km is 10 times the largest at which links were held against "
+                "independent methods, 5000 km. Figures that depend on it are extrapolated."
+            ),
+            (
+                "link.power = 0 W is below the least at which links were held against independent "
+                "methods, 500 mW. Figures that depend on it are extrapolated."
+            ),
+            (
+                "loop.rate = 4 kHz is 4 times the largest at which loops were held against "
+                "independent methods, 1 kHz. Figures that depend on it are extrapolated."
+            ),
+        ]
+    ]
+    inside = stated(loop__rate="1000.5 Hz", link__range="999.5 m")
+    assert foundation.placards(inside) == []
+
+
+def test_signs_stand_behind_numbers_of_rows_sums_and_folds_alone(monkeypatch):
+    held = {"domains": DOMAINS, "bare": ["B"], "depends": {"A": ["link.range"], "C | Relay": ["loop.rate"]}}
+    monkeypatch.setattr(foundation, "shipped", lambda: held)
+    monkeypatch.setattr(marks, "shipped", lambda: held)
+    monkeypatch.setattr(marks, "kind_of", lambda name: {"a": "A", "b": "B", "c": "C"}.get(name.rpartition(".")[2], ""))
+    of = marks.Marks.of(stated(link__range="50000 km", loop__rate="2 kHz"))
+    table = Table(
+        "t",
+        ("", "one", "two"),
+        [("x 1", "12", Cell("3.5", "PASS", "hint")), ("y", "none", "-4"), ("all", "12", "-0.5")],
+        names={1: "z.a", 2: ["z.b", "z.c", "z.d"]},
+        totals=1,
+        folded="12 of 112 and 3.12, or 12 % with 12",
+    )
+    made = of.table(table)
+    assert [[str(cell) for cell in row] for row in made.rows] == [
+        ["x 1", "12 †", "3.5 ‡ PASS"],
+        ["y", "none", "-4 †"],
+        ["all", "12 †", "-0.5"],
+    ]
+    assert made.folded == "12 † of 112 and 3.12, or 12 † % with 12 †"
+    assert [made.rows[0][2].hint, made.rows[0][1].hint] == [
+        ("hint Compared with nothing, and defined by no source: nothing says that it is what it is meant to be."),
+        (
+            "link.range = 50000 km is 10 times the largest at which links were held against "
+            "independent methods, 5000 km. Figures that depend on it are extrapolated."
+        ),
+    ]
+    assert list(of.legend.lines) == [
+        (
+            "† link.range = 50000 km is 10 times the largest at which links were held against "
+            "independent methods, 5000 km. Figures that depend on it are extrapolated."
+        ),
+        (
+            "† loop.rate = 2 kHz is 2 times the largest at which loops were held against "
+            "independent methods, 1 kHz. Figures that depend on it are extrapolated."
+        ),
+        ("‡ Compared with nothing, and defined by no source: nothing says that it is what it is meant to be. So: B."),
+    ]
+    document = {"z": {"a": 1.0, "list": [{"b": 2.0, "a": 3.0}, {"b": 4.0, "d": 5.0}], "c": 6.0}}
+    assert of.data(document) == [
+        {
+            "sign": "†",
+            "quantities": ["A"],
+            "beyond": ["link.range"],
+            "because": [
+                (
+                    "link.range = 50000 km is 10 times the largest at which links were held against "
+                    "independent methods, 5000 km. Figures that depend on it are extrapolated."
+                )
+            ],
+            "numbers": ["z.a", "z.list.*.a"],
+        },
+        {
+            "sign": "‡",
+            "quantities": ["B"],
+            "beyond": [],
+            "because": [
+                ("Compared with nothing, and defined by no source: nothing says that it is what it is meant to be.")
+            ],
+            "numbers": ["z.list.*.b"],
+        },
+        {
+            "sign": "†",
+            "quantities": ["C"],
+            "beyond": ["loop.rate"],
+            "because": [
+                (
+                    "loop.rate = 2 kHz is 2 times the largest at which loops were held against "
+                    "independent methods, 1 kHz. Figures that depend on it are extrapolated."
+                )
+            ],
+            "numbers": ["z.c"],
+        },
+    ]
+    verdict = View("v", [Verdict("h", [table, "said"])])
+    (inner,) = of.blocks([verdict])[0].blocks
+    assert str(inner.blocks[0].rows[0][1]) == "12 †" and inner.blocks[1] == "said"
+
+
+def a_requirement(name="r", unit="dB", required=3.0, actual=4.0, **more):
+    margin = more.pop("margin", actual - required)
+    return Requirement("communication", name, unit, required, actual, margin, more.pop("limited_by", "x"), **more)
+
+
+def test_requirements_stand_in_the_order_of_what_they_spare_and_say_what_proves_nothing():
+    found = [
+        a_requirement("met by 1 dB"),
+        a_requirement("missed by 2 dB", actual=1.0),
+        a_requirement("derived", actual=3.0, derived=("key = 1 (from a)", "key = 2")),
+        a_requirement("share", "%", 99.0, 99.9),
+        a_requirement("angle", "rad", 1e-5, 8e-6, margin=2e-6),
+        a_requirement("angle missed", "rad", 1e-5, 2e-5, margin=-1e-5, limited_by="the jitter"),
+        a_requirement("unknown", actual=9.0, unknown="a noise"),
+    ]
+    r = report_requirements
+    assert [each.name for each in sorted(found, key=r.nearness)] == [
+        "angle missed",
+        "missed by 2 dB",
+        "unknown",
+        "angle",
+        "met by 1 dB",
+        "share",
+        "derived",
+    ]
+    table = r.requirement_table(found, [f"cause {k}" for k in range(len(found))], "list")
+    assert [[str(cell) for cell in row] for row in table.rows] == [
+        ["met by 1 dB", "3.00 dB", "4.00 dB", "+1.00 dB", "PASS", "cause 0"],
+        ["missed by 2 dB", "3.00 dB", "1.00 dB", "−2.00 dB", "FAIL", "cause 1"],
+        ["derived", "3.00 dB", "3.00 dB", "+0.00 dB", "derived", "cause 2"],
+        ["share", "99 %", "99.9 %", "+0.9 %", "PASS", "cause 3"],
+        ["angle", "10 µrad", "8 µrad", "+2 µrad", "PASS", "cause 4"],
+        ["angle missed", "10 µrad", "20 µrad", "−10 µrad", "FAIL", "cause 5"],
+        ["unknown", "3.00 dB", "9.00 dB", "+6.00 dB", "FAIL", "cause 6"],
+    ]
+    assert [table.headings, table.brief, table.words, dict(table.names)] == [
+        (
+            "requirement",
+            "required",
+            "achieved",
+            "to spare",
+            "",
+            "contributes most",
+        ),
+        (
+            0,
+            1,
+            2,
+            3,
+            4,
+        ),
+        (
+            0,
+            5,
+        ),
+        {
+            2: [
+                "list.met by 1 dB.actual",
+                "list.missed by 2 dB.actual",
+                "list.derived.actual",
+                "list.share.actual",
+                "list.angle.actual",
+                "list.angle missed.actual",
+                "list.unknown.actual",
+            ],
+            3: [
+                "list.met by 1 dB.margin",
+                "list.missed by 2 dB.margin",
+                "list.derived.margin",
+                "list.share.margin",
+                "list.angle.margin",
+                "list.angle missed.margin",
+                "list.unknown.margin",
+            ],
+        },
+    ]
+    assert [r.requirement_data(each) for each in (found[2], found[6])] == [
+        {
+            "name": "derived",
+            "unit": "dB",
+            "required": 3.0,
+            "actual": 3.0,
+            "margin": 0.0,
+            "met": True,
+            "mark": "derived",
+            "derived": ["key = 1 (from a)", "key = 2"],
+            "limited_by": "x",
+        },
+        {
+            "name": "unknown",
+            "unit": "dB",
+            "required": 3.0,
+            "actual": 9.0,
+            "margin": 6.0,
+            "met": False,
+            "mark": "FAIL",
+            "derived": [],
+            "limited_by": "a noise",
+        },
+    ]
+    met = [each for each in found if each.met]
+    assert [r.met_words(met), r.derived_words(found), r.met_words(met[:1]), r.derived_words(met[:1])] == [
+        "every requirement is met, 1 of 4 by the choice of an input",
+        "Derived, so that meeting it proves nothing: key = 1 (from a); key = 2.",
+        "every requirement is met",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "least", "most"),
+    [(1.2345, "1.24", "1.23"), (0.0098765, "9.88 m", "9.87 m"), (123456.0, "124 k", "123 k"), (2.0, "2", "2")],
+)
+def test_an_advised_value_is_rounded_to_the_side_that_meets(value, least, most):
+    missed, met = a_requirement(actual=1.0), a_requirement()
+    r = report_requirements
+    unit = "" if least[-1].isalpha() else " "
+    assert r.advise_at_least(missed, "a.b", value, "W") == f"; to meet it, take a.b = {least}{unit}W or more"
+    assert r.advise_at_most(missed, "a.b", value, "W") == f"; to meet it, take a.b = {most}{unit}W or less"
+    assert r.advise_at_most(met, "a.b", value, "W") == f"; to move it, change a.b, which may be {most}{unit}W at most"
+    assert r.advise_change(missed, "a.b", "lower") == "; to meet it, lower a.b"
+
+
+def test_warnings_are_told_by_the_first_of_them():
+    r = report_requirements
+    assert [r.first_warning(each) for each in ([], ["one"], ["one", "two"])] == [
+        "",
+        "Warning: one.",
+        "Warning 1 of 2 (all by --verbose): one.",
+    ]
+
+
+# ----------------------------------------------------------------------------------------------------- tables and views
+def test_a_table_of_two_groups_of_words_is_stacked_behind_its_last_number():
+    rows = [("a", "1", "first", Cell("", "PASS")), ("b", "22", "", "last"), ("c", "", "x", "")]
+    table = Table("t", ("name", "number", "what", "why"), rows, (0, 2, 3), names={1: "n.x", 2: ["p", "q", "r"]})
+    narrow = table.narrowed()
+    assert [list(narrow.headings), [list(row) for row in narrow.rows], list(narrow.words)] == [
+        ["name", "number", "what"],
+        [["a", "1", "first\nwhy: PASS"], ["b", "22", "\nwhy: last"], ["c", "", "x"]],
+        [0, 2],
+    ]
+    kept = table.columns((0, 2))
+    assert [dict(kept.names), list(kept.words), kept.rows, [kept.name(2, 1), kept.name(0, 0)]] == [
+        {1: ["p", "q", "r"]},
+        [0, 1],
+        [["a", "first"], ["b", ""], ["c", "x"]],
+        ["r", ""],
+    ]
+    assert tables_text([replace(table, brief=(0, 1))], ["One sentence.", "Another."], 30).split("\n") == [
+        "t",
+        "",
+        " name   number",
+        " ─────────────",
+        " a      1",
+        " b      22",
+        " c",
+        "",
+        "One sentence.",
+        "Another.",
+    ]
+
+
+def test_a_table_is_narrowed_below_the_width_that_it_takes():
+    row = ("w" * 10, "1" * 40, "2" * 41, "3" * 42)
+    table = Table("t", ("a", "b", "c", "d"), [row], (0,), brief=(0, 1))
+    whole = 13 + 43 + 44 + 45
+    assert table.for_width(whole) is table
+    assert [len(each.headings) for each in (table.for_width(whole - 1), table.for_width(whole))] == [2, 4]
+
+
+def test_views_of_each_kind_stand_below_each_other_in_a_terminal():
+    blocks = [
+        "One.",
+        "Two.",
+        View("Empty"),
+        View("Title", [Points(["a point that is longer than its line has room", "b"]), Soft("soft words")]),
+        Verbatim("  kept\n as is"),
+        Verdict("Good", ["because"], True),
+        Drawing("n", "t", "c", "<svg/>"),
+    ]
+    assert views_text(blocks, 30).split("\n") == [
+        "One.",
+        "Two.",
+        "",
+        "Title",
+        "",
+        "- a point that is longer than",
+        "  its line has room",
+        "- b",
+        "",
+        "soft words",
+        "",
+        "  kept",
+        " as is",
+        "",
+        "Good",
+        "because",
+    ]
+
+
+def test_anchors_are_given_and_made_and_none_twice():
+    inner = [View("One two"), View("é")]
+    views = [View("One & Two"), View("One two"), View("x", inner, anchor="one-two-2"), View("--")]
+    taken = {"part"}
+    found = anchored(views, taken)
+    assert [[each.anchor, *[one.anchor for one in each.views]] for each in found] == [
+        ["one-two"],
+        ["one-two-2"],
+        ["one-two-2-2", "one-two-3", "part-2"],
+        ["part-3"],
+    ]
+    assert taken == {"part", "one-two", "one-two-2", "one-two-2-2", "one-two-3", "part-2", "part-3"}
+    assert [slug("A/b  (c)"), slug("é")] == ["a-b-c", "part"]
+    assert told("", None, "x", Points([]), Points(["y"])) == ("x", Points(["y"]))
