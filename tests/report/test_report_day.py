@@ -1646,3 +1646,177 @@ def test_the_words_of_each_way_and_assumption_are_of_their_own_numbers():
             "3.5 min or 3.33 min by the relay."
         ),
     ]
+
+
+# ----------------------------------------------------------------------------------------------------- arrays of a day
+def arrays_of(group):
+    """Each variable of a group with its axes, unit, name and values."""
+    found = group.to_xarray().to_dict()
+    several = {**found["coords"], **found["data_vars"]}
+    return {
+        name: [list(each["dims"]), each["attrs"].get("units"), each["attrs"].get("long_name"), plain(each["data"])]
+        for name, each in several.items()
+    }
+
+
+def test_arrays_of_contacts_have_each_number_of_the_second_one_too():
+    day = rich_day()
+    for k, e in enumerate(day.encounters):
+        e.contact.ends = f"end {k}"
+    assert arrays_of(arrays._contacts(day)) == {
+        "start": [["contact"], "s", "begin, since the epoch", [600.0, 7200.0]],
+        "end": [["contact"], "s", "end, since the epoch", [1350.0, 8000.0]],
+        "begins": [["contact"], "1", "what begins it", ["elevation mask of g", "Earth"]],
+        "ends": [["contact"], "1", "what ends it", ["end 0", "end 1"]],
+        "range_least": [["contact"], "m", "smallest range", [2000000.0, 3000000.0]],
+        "range_most": [["contact"], "m", "largest range", [3000000.0, 4500000.0]],
+        "point_ahead": [["contact"], "rad", "largest point-ahead angle", [3e-05, 6e-05]],
+        "rate": [["contact"], "rad/s", "largest angular rate of the line of sight", [0.0007, 0.0014]],
+        "acceleration": [["contact"], "rad/s^2", "largest change of that rate", [9e-06, 1.8e-05]],
+        "doppler": [["contact"], "Hz", "largest Doppler shift in magnitude", [4000000000.0, 8000000000.0]],
+        "could_carry": [
+            ["contact"],
+            "bit",
+            "data that it could carry within the span, mean of the runs",
+            [8000000000.0, 16000000000.0],
+        ],
+    }
+    assert arrays_of(arrays._passes(day.optical)) == {
+        "start": [["contact"], "s", "begin, since the epoch", [2000.0, 9000.0]],
+        "end": [["contact"], "s", "end, since the epoch", [2300.0, 9030.0]],
+        "begins": [["contact"], "1", "what begins it", ["elevation mask of s", "elevation mask of s"]],
+        "ends": [["contact"], "1", "what ends it", ["the Earth", "the Earth"]],
+        "station": [["contact"], "1", "ground station", ["=c", "a"]],
+        "could_carry": [["contact"], "bit", "data that it could carry within the span", [24000000000.0, 48000000000.0]],
+    }
+
+
+def test_arrays_of_assumptions_have_both_sides_of_three_ways():
+    assert arrays_of(arrays._assumptions(rich_day())) == {
+        "assumption": [["assumption"], "1", "what is changed", ["rate", "store"]],
+        "low": [["assumption"], "1", "low side of the change", ["1 Mbit/s", "1 GB"]],
+        "relay_low": [["assumption"], "bit", "relay with the low side", [2000000000000.0, 8000000000000.0]],
+        "direct_low": [["assumption"], "bit", "direct with the low side", [3000000000000.0, 0.0]],
+        "relay_latency_99_percent_low": [
+            ["assumption"],
+            "s",
+            "relay latency 99 percent with the low side",
+            [250.0, 210.0],
+        ],
+        "direct_latency_99_percent_low": [
+            ["assumption"],
+            "s",
+            "direct latency 99 percent with the low side",
+            [950.0, 910.0],
+        ],
+        "optical_low": [["assumption"], "bit", "optical with the low side", [500000000000.0, 2000000000000.0]],
+        "optical_latency_99_percent_low": [
+            ["assumption"],
+            "s",
+            "optical latency 99 percent with the low side",
+            [3600.0, 8000.0],
+        ],
+        "high": [["assumption"], "1", "high side of the change", ["as it is", "9 GB"]],
+        "relay_high": [["assumption"], "bit", "relay with the high side", [4000000000000.0, 4000000000000.0]],
+        "direct_high": [["assumption"], "bit", "direct with the high side", [2000000000000.0, 2000000000000.0]],
+        "relay_latency_99_percent_high": [
+            ["assumption"],
+            "s",
+            "relay latency 99 percent with the high side",
+            [200.0, 200.0],
+        ],
+        "direct_latency_99_percent_high": [
+            ["assumption"],
+            "s",
+            "direct latency 99 percent with the high side",
+            [900.0, 900.0],
+        ],
+        "optical_high": [["assumption"], "bit", "optical with the high side", [1000000000000.0, 1000000000000.0]],
+        "optical_latency_99_percent_high": [
+            ["assumption"],
+            "s",
+            "optical latency 99 percent with the high side",
+            [3000.0, 3000.0],
+        ],
+    }
+    assert len(arrays_of(arrays._assumptions(rich_day(optical=None)))) == 11
+
+
+def test_arrays_of_lines_of_sight_stand_one_contact_after_the_other():
+    names = ("time_s", "range_m", "range_rate_m_s", "rate_rad_s", "acceleration_rad_s2", "point_ahead_rad")
+    encounters = []
+    for k, size in enumerate((2, 3)):
+        sight = {name: 10.0 * (n + 1) + k + 0.25 * np.arange(size) for n, name in enumerate(names)}
+        sight["doppler_hz"] = lambda wavelength, k=k, size=size: (k + 1.0) * np.arange(size) / wavelength
+        encounters.append(SimpleNamespace(sight=SimpleNamespace(**sight)))
+    day = rich_day(encounters=encounters, data=SimpleNamespace(table=SimpleNamespace(wavelength_m=0.5)))
+    assert arrays_of(arrays._line_of_sight(day)) == {
+        "contact": [["sample"], "1", "number of the contact in the span, from 1", [1.0, 1.0, 2.0, 2.0, 2.0]],
+        "time": [["sample"], "s", "time since the epoch", [10.0, 10.25, 11.0, 11.25, 11.5]],
+        "range": [["sample"], "m", "range", [20.0, 20.25, 21.0, 21.25, 21.5]],
+        "range_rate": [["sample"], "m/s", "range rate, positive while they recede", [30.0, 30.25, 31.0, 31.25, 31.5]],
+        "doppler": [["sample"], "Hz", "frequency received less sent", [0.0, 2.0, 0.0, 4.0, 8.0]],
+        "rate": [["sample"], "rad/s", "angular rate of the line of sight", [40.0, 40.25, 41.0, 41.25, 41.5]],
+        "acceleration": [["sample"], "rad/s^2", "change of that rate, as a vector", [50.0, 50.25, 51.0, 51.25, 51.5]],
+        "point_ahead": [["sample"], "rad", "point-ahead angle", [60.0, 60.25, 61.0, 61.25, 61.5]],
+    }
+
+
+def test_arrays_of_sessions_and_of_a_contact_in_time_have_each_field():
+    names = ("start_s", "locked_s", "end_s", "rate_bit_s", "volume_bit")
+    planned = [
+        SimpleNamespace(satellite=f"n{k}", relay=f"r{k}", **{name: 100.0 * (n + 1) + k for n, name in enumerate(names)})
+        for k in range(2)
+    ]
+    assert arrays_of(arrays._sessions(rich_plan(planned=planned))) == {
+        "satellite": [["session"], "1", "satellite", ["n0", "n1"]],
+        "relay": [["session"], "1", "relay", ["r0", "r1"]],
+        "start": [["session"], "s", "begin, since the epoch", [100.0, 101.0]],
+        "locked": [["session"], "s", "from when data flow, since the epoch", [200.0, 201.0]],
+        "end": [["session"], "s", "end, since the epoch", [300.0, 301.0]],
+        "data_rate": [["session"], "bit/s", "data rate", [400.0, 401.0]],
+        "volume": [["session"], "bit", "volume", [500.0, 501.0]],
+    }
+    log = [SimpleNamespace(time_s=40.0 + k, state=f"s{k}", to=f"t{k}", cause=f"c{k}") for k in range(2)]
+    own = ("start_s", "range_m", "point_ahead_rad", "rate_rad_s", "rms_rad", "largest_rad", "lowest_margin_db")
+    windows = [SimpleNamespace(**{name: 10.0 * (n + 1) + k for n, name in enumerate(own)}) for k in range(3)]
+    assert arrays_of(arrays._contact_run(SimpleNamespace(log=log, windows=windows))) == {
+        "state": [["transition"], "1", "state that is left", ["s0", "s1"]],
+        "to": [["transition"], "1", "state that follows", ["t0", "t1"]],
+        "cause": [["transition"], "1", "why", ["c0", "c1"]],
+        "time": [["transition"], "s", "time since the epoch", [40.0, 41.0]],
+        "window_start": [["window"], "s", "begin of the window, since the epoch", [10.0, 11.0, 12.0]],
+        "range": [["window"], "m", "range", [20.0, 21.0, 22.0]],
+        "point_ahead": [["window"], "rad", "point-ahead angle", [30.0, 31.0, 32.0]],
+        "rate": [["window"], "rad/s", "angular rate of the line of sight", [40.0, 41.0, 42.0]],
+        "rms": [["window"], "rad", "radial rms of the pointing error", [50.0, 51.0, 52.0]],
+        "largest": [["window"], "rad", "largest radial pointing error", [60.0, 61.0, 62.0]],
+        "lowest_margin": [["window"], "dB", "lowest margin of the communication link", [70.0, 71.0, 72.0]],
+    }
+
+
+def test_the_groups_of_a_day_are_named_by_its_ways(monkeypatch):
+    for name in ("_contacts", "_line_of_sight", "_assumptions", "_day_way", "_passes", "_contact_run", "_sessions"):
+        monkeypatch.setattr(arrays, name, lambda *of, name=name: arrays.Group({}))
+    day = rich_day()
+    assert sorted(arrays._day(day, object(), object())) == [
+        "day/assumptions",
+        "day/contact_run",
+        "day/contacts",
+        "day/direct_downlink",
+        "day/line_of_sight",
+        "day/optical_downlink",
+        "day/optical_passes",
+        "day/passes",
+        "day/relay",
+        "day/sessions",
+    ]
+    assert sorted(arrays._day(rich_day(direct=None), None, None)) == [
+        "day/assumptions",
+        "day/contacts",
+        "day/line_of_sight",
+        "day/optical_downlink",
+        "day/optical_passes",
+        "day/relay",
+    ]
+    assert {each.attributes["epoch"] for each in arrays._day(day, None, None).values()} == {"an epoch"}

@@ -20,7 +20,7 @@ from microrad.report.error_budget.page import budget_view
 from microrad.report.fine_pointing.windows import index_text
 from microrad.report.plotting.sheet import Bars, Line, Rule
 from microrad.report.quantities import micro, percent
-from microrad.report.results import tolerances
+from microrad.report.results import arrays, tolerances
 from microrad.report.results.arrays import study_netcdf
 from microrad.report.results.comparison import is_number, leaves
 from microrad.report.study.data import summary
@@ -675,3 +675,46 @@ def test_data_of_two_unlike_requirements_as_a_whole():
 )
 def test_an_index_is_named_with_its_times(index, text):
     assert index_text(index) == text
+
+
+def arrays_of(group):
+    """Each variable of a group with its axes, unit and values."""
+    found = group.to_xarray().to_dict()
+    several = {**found["coords"], **found["data_vars"]}
+    return {name: [list(v["dims"]), v["attrs"].get("units"), plain(v["data"])] for name, v in several.items()}
+
+
+def test_arrays_of_two_unlike_requirements_as_a_whole():
+    found = {name: arrays_of(group) for name, group in arrays._pointing_errors(two_spectra()).items()}
+    assert found["error_budget/requirements"].pop("limit")[2][0] == 5e-6
+    assert found["error_budget/sources"].pop("may_be")[2][1:4] == [0.0, "inf", 1.5]
+    assert found == {
+        "error_budget/requirements": {
+            "requirement": [["requirement"], "1", ["code_word", "slow_drift"]],
+            "index": [["requirement"], "1", ["APE", "PDE"]],
+            "confidence": [["requirement"], "1", [0.9973, 0.95]],
+            "by_rules": [["requirement"], "rad", [6e-06, 2e-06]],
+            "by_distribution": [["requirement"], "rad", [4e-06, 3e-06]],
+            "error": [["requirement", "size"], "rad", [[0.0, 2e-06, 6.25e-06], [0.0, 2e-06, 6.25e-06]]],
+            "beyond": [["requirement", "size"], "1", [[1.0, 0.25, 0.0], [1.0, 0.25, 0.0]]],
+        },
+        "error_budget/sources": {
+            "source": [["entry"], "1", ["bias", "wheel", "heat", "tip_tilt", "tip_tilt", "heat"]],
+            "kind": [["entry"], "1", ["constant", "loop", "drift", "random", "random", "drift"]],
+            "mean": [["entry"], "rad", [2e-06, 1.5e-06, 1e-06, 5e-07, 5e-07, 1e-06]],
+            "deviation": [["entry"], "rad", [5.2e-06, 3.9e-06, 2.6e-06, 1.3e-06, 1.3e-06, 2.6e-06]],
+            "contribution": [["entry"], "rad", [1e-06, 7.5e-07, 5e-07, 2.5e-07, 1.875e-07, 3.75e-07]],
+            "weight": [["entry"], "1", [0.25, 0.1875, 0.125, 0.0625, 0.0625, 0.125]],
+            "without": [["entry"], "rad", [5e-06, 4e-06, 3e-06, 2e-06, 2e-06, 3e-06]],
+            "requirement": [
+                ["entry"],
+                "1",
+                ["code_word", "code_word", "code_word", "code_word", "slow_drift", "slow_drift"],
+            ],
+        },
+        "error_budget/spectra": {
+            "source": [["source"], "1", ["left_over", "other"]],
+            "frequency": [["frequency"], "Hz", [1.0, 10.0, 100.0]],
+            "density": [["source", "frequency"], "rad^2/Hz", [[4e-12, 2e-12, 1e-12], [1e-12, 8e-12, "nan"]]],
+        },
+    }

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drawn import figure_of
 from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad import link
 from microrad.core.budget import Line
@@ -1014,3 +1015,153 @@ def test_the_required_margin_is_marked_strictly_within_the_axis(plain, monkeypat
     assert texts(figure).count("required") == shown
     other = link_module.tornado(replace(plain, file=file), plain.tornados[1])
     assert "required" not in texts(other)
+
+
+# --------------------------------------------------------------------------------------- figures of the links, whole
+def a_swing(key, value, unit, low, high, margins, kind="paper"):
+    return SimpleNamespace(
+        key=key,
+        value=value,
+        unit=unit,
+        low=low,
+        high=high,
+        margin_low_db=margins[0],
+        margin_high_db=margins[1],
+        swing_db=abs(margins[1] - margins[0]) if all(map(math.isfinite, margins)) else math.inf,
+        kind=kind,
+    )
+
+
+def tornado_of(name):
+    swings = [
+        a_swing("communication.receiver_bandwidth", 2.5e8, "Hz", 2.25e8, 2.75e8, (-math.inf, 4.5)),
+        a_swing("communication.transmit_power", 5.0, "W", 4.5, 5.5, (2.5, 3.25), "assumption"),
+        a_swing("channel.loss", -1.5, "dB", -2.0, -1.0, (3.5, 2.75)),
+        a_swing("code.bit_error_ratio", 1e-6, "", 1e-7, 1e-5, (2.9, 3.1), "assumption"),
+    ]
+    return SimpleNamespace(of=name, margin_db=3.0, swings=swings)
+
+
+def links_of(of, *, jitter=None, required_db=3.0):
+    requirement = SimpleNamespace(margin_db=required_db, outage=0.01, probability=0.99, quantile=0.99)
+    mission = SimpleNamespace(requirement=requirement, jitter=jitter)
+    return SimpleNamespace(file=SimpleNamespace(mission=mission), communication=SimpleNamespace(name=of))
+
+
+def test_a_tornado_with_an_input_without_a_link_as_a_whole(plain):
+    data, beacon = (t.of for t in plain.tornados[:2])
+    assert figure_of(link_module.tornado(links_of(data), tornado_of(data))) == [
+        "tornado",
+        "What moves the margin",
+        (
+            "Margin with one input at a time 10 % lower and higher, all others as they are. An "
+            "input in decibels is moved by 0.5 dB; a bit error ratio or an outage becomes ten "
+            "times smaller and larger. No input leaves its bounds. Assumptions among them: "
+            "communication.transmit_power, code.bit_error_ratio."
+        ),
+        {
+            "input": [
+                "communication.receiver_bandwidth",
+                "communication.transmit_power",
+                "channel.loss",
+                "code.bit_error_ratio",
+            ],
+            "SI unit": ["Hz", "W", "dB", ""],
+            "margin lower (dB)": ["-inf", 2.5, 3.5, 2.9],
+            "margin higher (dB)": [4.5, 3.25, 2.75, 3.1],
+            "value (SI)": [250000000.0, 5.0, -1.5, 1e-06],
+            "lower (SI)": [225000000.0, 4.5, -2.0, 1e-07],
+            "higher (SI)": [275000000.0, 5.5, -1.0, 1e-05],
+        },
+        "Sheet width=6.4 height=1.98",
+        "Panel 0 0 x=<title=margin of the communication link (dB)> y=<low=3.6 high=-0.6 ticks={0:",
+        "  receiver_bandwidth = 250 MHz, 1: transmit_power = 5 W, 2: channel.loss = -1.5 dB, 3:",
+        ("  code.bit_error_ratio = 1e-06} grid=False size=8> legend=<place=lower right only=[<rings=[]"),
+        "  colour=#E69F00 label=input lower> <rings=[] colour=#0072B2 label=input higher>]>",
+        "Bars at=[0] start=[3] end=[0.75] breadth=[0.7] colour=#E69F00",
+        "Bars at=[0] start=[3] end=[4.5] breadth=[0.7] colour=#0072B2",
+        "Words text= x=1 y=0 colour=#777777 shift=[5 0] of_panel=x",
+        "Bars at=[1] start=[3] end=[2.5] breadth=[0.7] colour=#E69F00",
+        "Bars at=[1] start=[3] end=[3.25] breadth=[0.7] colour=#0072B2",
+        "Words text= x=1 y=1 colour=#777777 shift=[5 0] of_panel=x",
+        "Bars at=[2] start=[3] end=[3.5] breadth=[0.7] colour=#E69F00",
+        "Bars at=[2] start=[3] end=[2.75] breadth=[0.7] colour=#0072B2",
+        "Words text= x=1 y=2 colour=#777777 shift=[5 0] of_panel=x",
+        "Bars at=[3] start=[3] end=[2.9] breadth=[0.7] colour=#E69F00",
+        "Bars at=[3] start=[3] end=[3.1] breadth=[0.7] colour=#0072B2",
+        "Words text= x=1 y=3 colour=#777777 shift=[5 0] of_panel=x",
+        "Rule at=3 upright=True width=0.8",
+        "Words text=< no margin: receiver too slow x=0.75 y=0 shift=[3 0]",
+        "Rule at=3 upright=True colour=#D55E00 dash=--",
+        "Words text=required x=3 y=-0.55 colour=#D55E00 base=bottom shift=[3 0]",
+    ]
+    other = figure_of(link_module.tornado(links_of(data), tornado_of(beacon)))
+    assert other[:2] == ["tornado-beacon", "What moves the margin of the beacon"]
+    assert not any("required" in str(line) for line in other[4:])
+
+
+def test_wide_beacon_and_scan_are_drawn_with_their_own_times():
+    scan = SimpleNamespace(coverage=0.9, detection_s=0.002, beam_radius_rad=2.5e-5, overlap=0.15, jitter_rms_rad=3e-6)
+    mission = SimpleNamespace(acquisition=SimpleNamespace(scan=scan))
+    found = SimpleNamespace(sigma_rad=1.25e-4, scanned=SimpleNamespace(half_angle_rad=4e-5))
+    t = SimpleNamespace(
+        sigma_rad=np.array([5e-5, 1e-4, 2e-4]),
+        wide_time_s=np.array([0.1, 1.6, 25.6]),
+        wide_probability=np.array([0.9, 0.91, 0.92]),
+        scan_time_s=np.array([2.0, 8.0, 32.0]),
+        scan_mean_time_s=np.array([1.0, 4.5, 17.0]),
+        scan_probability=np.array([0.875, 0.95, 0.99]),
+    )
+    study = SimpleNamespace(file=SimpleNamespace(mission=mission))
+    assert figure_of(link_module.trade(study, found, t)) == [
+        "wide-beam-or-scan",
+        "Wide beacon or scan",
+        (
+            "Time to be found at 90 % coverage, without settling and light time. The beacon's "
+            "power, spread over a cone that covers the uncertainty, makes the partner's sensor "
+            "integrate with the fourth power of it (noise that does not depend on the light; "
+            "at least 2 ms); the same power in a beam of 40 µrad half angle at 1/e2, used out "
+            "to 25 µrad and led over it with an overlap of 0.15 under 3 µrad of jitter per "
+            "axis, takes a time that grows with its square and finds 87.5 % or more."
+        ),
+        {
+            "uncertainty per axis (rad)": [5e-05, 0.0001, 0.0002],
+            "wide beacon, time (s)": [0.1, 1.6, 25.6],
+            "wide beacon, probability": [0.9, 0.91, 0.92],
+            "scan, whole time (s)": [2.0, 8.0, 32.0],
+            "scan, mean time (s)": [1.0, 4.5, 17.0],
+            "scan, probability": [0.875, 0.95, 0.99],
+        },
+        "Sheet width=6.4 height=3.6",
+        ("Panel 0 0 x=<title=pointing uncertainty, rms per axis (µrad) log=True ticks=[30 100 300 1000]>"),
+        "  y=<title=time (s) log=True> legend=<place=upper left>",
+        ("Line x=[50 100 200] y=[0.1 1.6 25.6] colour=#0072B2 label=wide beacon: detection at the edge of"),
+        "  its cone",
+        "Line x=[50 100 200] y=[2 8 32] colour=#E69F00 dash=-- label=spiral scan: whole area",
+        "Line x=[50 100 200] y=[1 4.5 17] colour=#E69F00 dash=: label=spiral scan: mean until found",
+        "Rule at=125 upright=True colour=#D55E00",
+        "Words text=this mission x=125 y=32 colour=#D55E00 base=top shift=[3 0]",
+    ]
+
+
+def test_an_interleaver_is_drawn_with_what_it_costs_at_each_span():
+    mission = SimpleNamespace(requirement=SimpleNamespace(margin_db=1.5))
+    f = fading_of(curve=SimpleNamespace(span_s=(0.0, 0.002, 0.01, 0.1), penalty_db=(6.0, math.inf, 2.0, 1.25)))
+    assert figure_of(link_module.interleaver(SimpleNamespace(file=SimpleNamespace(mission=mission)), f)) == [
+        "interleaver",
+        "What an interleaver brings",
+        (
+            "Extra power that brings the mean bit error ratio back to 10⁻⁶ under a series, "
+            "over constant power, with LDPC. A span that is long against the fades lets each "
+            "code word see all powers that there are. A span without a point costs more than "
+            "any power makes up for."
+        ),
+        {"span (s)": [0.0, 0.002, 0.01, 0.1], "power that the fades cost (dB)": [6.0, "inf", 2.0, 1.25]},
+        "Sheet width=6.4 height=3.4 legend=<place=above columns=2>",
+        ("Panel 0 0 x=<title=span of the interleaver (ms) log=True> y=<title=power that the fades cost"),
+        "  (dB)>",
+        "Line x=[2 10 100] y=[nan 2 1.25] colour=#0072B2 label=with an interleaver marker=o size=4",
+        "Rule at=6 upright=False colour=#E69F00 dash=-- label=without one",
+        "Rule at=3.5 upright=False colour=#D55E00 dash=: label=what the margin can spare",
+        "Line x=[10] y=[2] dash= label=this mission marker=D size=7",
+    ]

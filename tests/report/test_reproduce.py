@@ -996,3 +996,165 @@ def test_a_report_without_hashes_of_its_files_has_no_other_figures(tmp_path):
     assert other() == other(files_sha256={}) == []
     assert other(files_sha256={"figures/a.csv": "1", "figures/d.csv": "1"}) == ["figures/c.csv", "figures/d.csv"]
     assert other(files_sha256={"figures/a.csv": "2", "figures/c.csv": "1", "b.csv": "2"}) == ["figures/a.csv"]
+
+
+# ------------------------------------------------------------------------------------------- outcomes with all of it
+def test_an_outcome_in_which_all_differs_is_told_and_held_as_a_whole():
+    differences = (
+        compared.Difference("budget[1].margin_db", 2.0, 1.0, 0.5, 0.25),
+        compared.Difference("verdict", "the loop is met", "the loop is\x07 missed", math.nan),
+        compared.Difference("x", 1.0, math.inf, math.inf),
+        compared.Difference("y", 0.123456789012345, 0.123456789099999, 7e-10, 1e-12),
+    )
+    found = outcome(
+        numbers=1234,
+        largest=math.inf,
+        differences=differences,
+        altered=("its summary was changed",),
+        unlike={"numpy": ("1.2", "2.0"), "processor": ("none", "x86")},
+        undetailed="x86_64",
+        files=("figures/f.csv", "figures/g.csv"),
+        read=("figures/g.csv",),
+        page=("line 3: was a and is b",),
+        layout=True,
+    )
+    assert reproduce.reproduction_text(found).split("\n") == [
+        (
+            "r.html: the report is not reproduced (1234 numbers compared, largest relative "
+            "difference inf): 4 differ, and it was changed after it was written."
+        ),
+        (
+            "Another machine or other versions: compared to stated tolerances (numpy was 1.2 "
+            "and is 2.0; of its machine the report says no more than x86_64, as version 0.1.0 "
+            "wrote it)."
+        ),
+        "its summary was changed",
+        "budget[1].margin_db: was 2 and is 1, relative difference 0.5 (0.25 apart is allowed)",
+        "verdict: was the loop is met and is the loop is\\u0007 missed",
+        "x: was 1 and is inf, relative difference inf",
+        ("y: was 0.123456789012345 and is 0.12345678909999901, relative difference 7e-10 (1e-12 apart is allowed)"),
+        "data of figures, compared as numbers, not byte for byte the same: figures/g.csv",
+        (
+            "data of figures, not byte for byte the same: figures/f.csv; their numbers are not "
+            "compared, since they do not stand beside the report, or have rows of their own on "
+            "each machine"
+        ),
+        "the page's text is not what this run writes: line 3: was a and is b",
+    ]
+    data = reproduce.reproduction_data(found)
+    data["differences"] = [{**each, "now": str(each["now"])} for each in data["differences"]]
+    assert data == {
+        "report": "r.html",
+        "same": False,
+        "compared": "to stated tolerances",
+        "because": (
+            "Another machine or other versions: compared to stated tolerances (numpy was 1.2 "
+            "and is 2.0; of its machine the report says no more than x86_64, as version 0.1.0 "
+            "wrote it)."
+        ),
+        "numbers": 1234,
+        "largest_relative_difference": None,
+        "differences": [
+            {
+                "place": "budget[1].margin_db",
+                "was": 2.0,
+                "now": "1.0",
+                "relative_difference": 0.5,
+                "allowed_distance": 0.25,
+            },
+            {
+                "place": "verdict",
+                "was": "the loop is met",
+                "now": "the loop is\x07 missed",
+                "relative_difference": None,
+                "allowed_distance": 0.0,
+            },
+            {"place": "x", "was": 1.0, "now": "inf", "relative_difference": None, "allowed_distance": 0.0},
+            {
+                "place": "y",
+                "was": 0.123456789012345,
+                "now": "0.123456789099999",
+                "relative_difference": 7e-10,
+                "allowed_distance": 1e-12,
+            },
+        ],
+        "altered": ["its summary was changed"],
+        "machine_and_versions": {"numpy": {"was": "1.2", "now": "2.0"}, "processor": {"was": "none", "now": "x86"}},
+        "figure_data": ["figures/f.csv", "figures/g.csv"],
+        "figure_data_compared": ["figures/g.csv"],
+        "layout": True,
+        "page": ["line 3: was a and is b"],
+    }
+
+
+def test_trees_of_other_shapes_differ_at_the_places_that_one_of_them_lacks():
+    was = {"a": [1.0, {"unit": "m", "value": 2.0}], "b": {"c": 1}, "d": True, "e": 5.0, "g": "x 3 and 4.0"}
+    now = {"a": [1.0, {"unit": "m", "value": 2.5}, 7.0], "b": [1], "d": 1, "f": None, "g": "x 3 and 4.1"}
+    units = []
+
+    def allowed(place, unit, a, b):
+        units.append((place, unit))
+        return 0.25
+
+    found = compared.compare(was, now, allowed)
+    assert [str(each) for each in found.differences] == [
+        "a[1].value: was 2 and is 2.5, relative difference 0.2 (0.25 apart is allowed)",
+        "a[2]: was (none) and is 7",
+        "b: was {'c': 1} and is [1]",
+        "d: was True and is 1",
+        "e: was 5 and is (none)",
+        "f: was (none) and is None",
+    ]
+    assert (found.numbers, found.largest, units) == (
+        2,
+        0.2,
+        [
+            (
+                "a[0]",
+                "",
+            ),
+            (
+                "a[1].value",
+                "m",
+            ),
+        ],
+    )
+    assert len(compared.compare(was, now, None).differences) == len(found.differences) + 1
+    both = found + compared.Comparison(3, 0.9, found.differences[:1])
+    assert (both.numbers, both.largest, len(both.differences)) == (found.numbers + 3, 0.9, len(found.differences) + 1)
+
+
+def test_tables_are_compared_by_column_and_row_with_the_unit_of_the_heading():
+    was = "time (s),gain,gone (m)\n0,1,5\n1,2,\n2,x,\n"
+    now = "gain,time (s),new\n1,0,1\n2.5,1.5,1\nx,2,1\n9,3,1\n"
+    units = []
+
+    def allowed(place, unit, a, b):
+        units.append((place, unit))
+        return 0.5
+
+    found = compared.compare_tables("figures/f.csv", was, now, allowed)
+    assert [str(each) for each in found.differences] == [
+        "figures/f.csv: time (s), row 4: was  and is 3",
+        "figures/f.csv: gain, row 4: was  and is 9",
+        "figures/f.csv: gone (m): was a column and is (none)",
+        "figures/f.csv: new: was (none) and is a column",
+    ]
+    assert units[:4] == [
+        (
+            "figures/f.csv: time (s), row 1",
+            "s",
+        ),
+        (
+            "figures/f.csv: time (s), row 2",
+            "s",
+        ),
+        (
+            "figures/f.csv: time (s), row 3",
+            "s",
+        ),
+        (
+            "figures/f.csv: gain, row 1",
+            "",
+        ),
+    ]

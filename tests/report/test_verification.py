@@ -1410,6 +1410,10 @@ def test_an_installation_that_fails_in_each_way_says_so_in_each_part():
         "c3: figure 6 is −60 where 60 is expected.",
         "Not founded: q4.",
     ]
+    assert [list(counts) for counts in v.by_subject.values()] == [
+        ["none", "validated", "verified"],
+        ["failed", "traced", "verified"],
+    ]
 
 
 def test_the_parts_of_a_verification_show_each_check_status_and_domain():
