@@ -14,6 +14,9 @@ from microrad.core import lti
 from microrad.export import choice
 from microrad.export.identifiers import LONGEST, identifier, suggested
 from microrad.export.linear_part import block_diagonal as block_diagonal_form
+from microrad.export.linear_part import block_diagonal as parting
+from microrad.export.linear_part import modes as modes_module
+from microrad.export.linear_part import sections as sections_module
 from microrad.export.linear_part.block_diagonal import block_diagonal
 from microrad.export.linear_part.modes import minimal, modes
 from microrad.export.linear_part.sections import MODAL, TRIANGULAR, sections
@@ -525,3 +528,175 @@ def test_other_names_are_refused_with_the_reason_and_an_example(name, why):
 )
 def test_suggested_names_resemble_the_text_and_can_be_borne(text, name):
     assert suggested(text) == name == identifier(name)
+
+
+# ---------------------------------------------------------------------------------------- the steps, each by itself
+def test_blocks_stand_one_behind_the_other():
+    assert [(s.start, s.stop) for s in parting.slices((2, 1, 3))] == [(0, 2), (2, 3), (3, 6)]
+    assert parting.slices(()) == []
+
+
+def test_a_quasi_triangular_matrix_is_parted_by_the_solution_of_its_sylvester_equation():
+    T11, T22 = np.array([[0.5, -0.2], [0.3, 0.5]]), np.array([[0.9, 0.4], [0.0, -0.7]])
+    T12 = np.array([[1.0, 2.0], [3.0, -1.0]])
+    X = parting._parting(T11, T12, T22)
+    np.testing.assert_allclose(T11 @ X - X @ T22, -T12, atol=1e-12)
+    assert parting._parting(T11, np.zeros((2, 2)), T22).tolist() == [[0.0, 0.0], [0.0, 0.0]]
+
+
+@pytest.mark.parametrize(("bound", "sizes"), [(1e3, (1, 1, 1)), (30.0, (2, 1)), (0.0, (3,))])
+def test_the_bound_decides_which_neighbours_stay_one_block(bound, sizes):
+    """Poles at 0.5 and 0.51 lean on each other by 100, and by 1 over 0.4 on the third."""
+    A = np.array([[0.5, 1.0, 0.0], [0.0, 0.51, 1.0], [0.0, 0.0, 0.9]])
+    found = parting.block_diagonal(A, np.ones((1, 3)), bound)
+    assert sorted(found.sizes) == sorted(sizes)
+    np.testing.assert_allclose((found.basis @ found.blocks @ found.inverse).astype(float), A, atol=1e-13)
+
+
+def test_strong_parts_stand_before_what_they_drive():
+    """0 and 2 drive each other and 1; 1 drives 3."""
+    A = np.zeros((4, 4))
+    A[0, 2] = A[2, 0] = A[1, 0] = A[3, 1] = 0.5
+    parts = [part.tolist() for part in parting._strong_parts(A)]
+    assert sorted(parts) == [[0, 2], [1], [3]]
+    order = [k for part in parts for k in part]
+    moved = A[np.ix_(order, order)]
+    sizes = tuple(len(part) for part in parts)
+    for at in parting.slices(sizes):
+        assert not moved[at.stop :, at].any()
+
+
+@pytest.mark.parametrize(
+    ("block", "bound", "turned"),
+    [
+        ([[0.5, -0.4], [0.1, 0.7]], 10.0, True),
+        ([[0.5, -400.0], [1e-4, 0.7]], 10.0, False),
+        ([[0.5, 0.4], [0.1, 0.7]], 10.0, False),
+    ],
+)
+def test_a_pair_turns_where_its_basis_leans_by_no_more_than_the_bound(block, bound, turned):
+    block, basis = np.array(block, dtype=np.longdouble), np.array([[1.0, 2.0], [0.5, -1.0]], dtype=np.longdouble)
+    made, found = parting._rotation(basis, block, bound)
+    poles = [np.sort_complex(np.linalg.eigvals(each.astype(float))) for each in (block, found)]
+    np.testing.assert_allclose(poles[0], poles[1], rtol=1e-9)
+    assert bool(found[0, 0] == found[1, 1] and found[0, 1] == -found[1, 0]) is turned
+    inverse = [np.linalg.inv(each.astype(float)) for each in (basis, made)]
+    whole = [(b @ m).astype(float) @ i for b, m, i in zip((basis, made), (block, found), inverse, strict=True)]
+    np.testing.assert_allclose(whole[0], whole[1], rtol=1e-9)
+
+
+def test_sizes_are_powers_of_two_near_the_rms_of_each_state():
+    """A first-order state of pole p driven by b has the variance b^2 / (1 - p^2)."""
+    A, driven = np.diag([0.6, -0.8, 0.0, 0.3]), np.array([[8.0, 0.0], [0.0, 0.1], [3.0, 4.0], [0.0, 0.0]])
+    rms = [8.0 / 0.8, 0.1 / 0.6, 5.0]
+    assert modes_module.sizes(A, driven).tolist() == [*(2.0 ** round(math.log2(each)) for each in rms), 1.0]
+    assert modes_module.sizes(np.zeros((0, 0)), np.zeros((0, 2))).size == 0
+
+
+def test_the_anti_windup_drives_as_much_as_the_readings_do():
+    B, L = np.array([[3.0, 4.0]]), np.array([[0.5]])
+    np.testing.assert_allclose(modes_module._driven(B, L), [[3.0, 4.0, 5.0]])
+    np.testing.assert_allclose(modes_module._driven(B, 0.0 * L), [[3.0, 4.0, 0.0]])
+    np.testing.assert_allclose(modes_module._driven(0.0 * B, L), [[0.0, 0.0, 0.5]])
+
+
+def test_a_staircase_reaches_what_a_chain_reaches_and_no_more():
+    """Input to 0, 0 to 1, 1 to 2; 3 and 4 are out of reach."""
+    A = np.diag([0.1, 0.2, 0.3, 0.4, 0.5])
+    A[1, 0], A[2, 1], A[0, 3] = 0.7, 0.6, 0.9
+    B = np.array([[2.0], [0.0], [0.0], [0.0], [0.0]])
+    Q, reached = modes_module._staircase(A, B)
+    assert reached == 3
+    np.testing.assert_allclose(Q.T @ Q, np.eye(5), atol=1e-12)
+    assert np.max(np.abs(Q[3:, :3])) < 1e-12 and np.max(np.abs(Q[:3, 3:])) < 1e-12
+    assert modes_module._staircase(A, np.zeros((5, 1)))[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("A", "repeated"),
+    [
+        ([[1.0, 0.5], [0.0, 1.0]], 1.0),
+        ([[1.0, 0.0], [0.0, 1.0]], None),
+        ([[0.9, 0.5], [0.0, 0.9]], None),
+        ([[-1.0, 0.25, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 0.5]], -1.0),
+    ],
+)
+def test_a_repeated_pole_on_the_circle_grows_where_its_states_drive_each_other(A, repeated):
+    found = sections_module._defective(np.array(A), np.linalg.eigvals(np.array(A)).astype(complex))
+    assert found == (None if repeated is None else pytest.approx(repeated))
+
+
+REFUSED_DESIGNS = {
+    "grows": lambda: controller(np.diag([0.5, 1.25]), np.ones((2, 1)), np.ones((1, 2))),
+    "turns and grows": lambda: controller(rotation(0.3, 1.01), np.ones((2, 1)), np.ones((1, 2))),
+    "repeats": lambda: controller(np.array([[1.0, 0.5], [0.0, 1.0]]), np.array([[0.0], [1.0]]), np.array([[1.0, 0.0]])),
+    "is not driven": lambda: controller(np.diag([0.5, 0.25]), np.array([[1.0], [0.0]]), np.ones((1, 2))),
+    "is not shown": lambda: controller(np.diag([0.5, -0.25]), np.ones((2, 1)), np.array([[1.0, 0.0]])),
+}
+
+
+def test_designs_that_cannot_fly_are_refused_in_all_their_words():
+    said = {}
+    for name, make in REFUSED_DESIGNS.items():
+        with pytest.raises(ExportError) as error:
+            sections(make())
+        said[name] = str(error.value)
+    assert said == {
+        "grows": (
+            "controller 'tried' is unstable: it has a pole with |z| = 1.25 at 0 Hz, and its "
+            "states would grow without bound while the loop is open or clipped; lower the "
+            "gains or bandwidth that it is tuned for"
+        ),
+        "turns and grows": (
+            "controller 'tried' is unstable: it has a pole with |z| = 1.01 at 47.7465 Hz, and "
+            "its states would grow without bound while the loop is open or clipped; lower the "
+            "gains or bandwidth that it is tuned for"
+        ),
+        "repeats": (
+            "controller 'tried' has a repeated pole on the unit circle, |z| = 1 at 0 Hz, whose "
+            "states drive each other and grow without bound; keep one integrator (or undamped "
+            "oscillator) in a chain, or draw one of the two inside the circle"
+        ),
+        "is not driven": (
+            "controller 'tried' is not minimal: no input and no anti-windup drives its mode "
+            "with |z| = 0.25 at 0 Hz, so that the code would compute it for nothing; take a "
+            "minimal realisation (`microrad.export.linear_part.modes.minimal` makes one), or "
+            "take out the filter or input that the mode belongs to"
+        ),
+        "is not shown": (
+            "controller 'tried' is not minimal: no output shows its mode with |z| = 0.25 at "
+            "500 Hz, so that the code would compute it for nothing; take a minimal realisation "
+            "(`microrad.export.linear_part.modes.minimal` makes one), or take out the filter "
+            "or input that the mode belongs to"
+        ),
+    }
+
+
+@pytest.mark.parametrize("matrix", ["A", "B", "C", "D", "anti_windup"])
+def test_a_number_that_is_not_finite_is_named_by_its_row_and_column(matrix):
+    of = controller(np.diag([0.5, 0.25]), np.ones((2, 2)), np.ones((2, 2)), np.zeros((2, 2)), np.ones((2, 2)))
+    parts = {key: getattr(of.system, key).copy() for key in "ABCD"} | {"anti_windup": of.anti_windup.copy()}
+    parts[matrix][1, 0] = math.nan
+    of = replace(of, system=lti.StateSpace(*(parts[key] for key in "ABCD")), anti_windup=parts["anti_windup"])
+    named = "anti-windup gain L" if matrix == "anti_windup" else matrix
+    with pytest.raises(
+        ExportError, match=re.escape(f"{named} is nan in row 1, column 0 (from 0); code cannot be made")
+    ):
+        modes_module.modes(of)
+
+
+def test_slow_blocks_and_integrators_alone_are_compensated():
+    A = np.zeros((5, 5))
+    A[0, 0], A[3, 3], A[4, 4] = 1.0, 0.989, 0.991
+    A[1:3, 1:3] = rotation(0.1, 0.995)
+    blocks, one = ((0, 1), (1, 2), (3, 1), (4, 1)), np.ones((5, 1))
+    form = sections_module.Sections(MODAL, blocks, A, one, one.T, np.zeros((1, 1)), one)
+    assert sections_module.compensated_states(form) == [True, True, True, False, True]
+
+
+@pytest.mark.parametrize("name", ["sin", "a__b", "2 axes", "double", "x_t", "_x", "y" * 40])
+def test_a_name_that_is_refused_says_what_may_stand_in_its_place(name):
+    with pytest.raises(ExportError) as error:
+        identifier(name)
+    assert str(error.value).startswith(f"{name!r} is no name for exported code: ")
+    assert str(error.value).endswith(f"; take for example {suggested(name)!r}")

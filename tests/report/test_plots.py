@@ -10,6 +10,8 @@ import matplotlib as mpl
 
 mpl.use("Agg")
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from matplotlib import pyplot
@@ -17,6 +19,7 @@ from matplotlib.axes import Axes
 from numpy.testing import assert_allclose, assert_array_equal
 
 from budget_files import kept_study
+from drawn import lines_of
 from microrad.core import lti
 from microrad.lab.identify import fit_frequency_response, identify, response_from_records
 from microrad.lab.recording import recording_from_arrays
@@ -720,3 +723,126 @@ def test_the_table_of_the_page_has_what_each_function_takes_and_draws():
 def test_the_page_names_each_function():
     functions = {name for name in vars(plots) if name.startswith("plot_")}
     assert set(re.findall(r"`(plot_\w+)`", PAGE)) == functions == {plot for plot, _, _ in PLOTS}
+
+
+# --------------------------------------------------------------------------------------------- sheets, line by line
+def test_loops_of_two_frequencies_are_drawn_less_each_its_own_line():
+    drive = np.array([-2.0, 0.0, 2.0, 1.0])
+    loops = [
+        SimpleNamespace(drive_v=drive, output_rad=1e-4 * np.array([-3.0, 1.0, 5.0, 2.0]), freq_hz=0.5),
+        SimpleNamespace(drive_v=2.0 * drive, output_rad=1e-4 * np.array([-7.0, -1.0, 6.0, 5.0]), freq_hz=25.0),
+    ]
+    assert lines_of(plots._loops(loops)) == [
+        "Sheet width=7.4 height=3.6 widths=[1 1]",
+        "Panel 0 0 x=<title=drive about the bias (V)> y=<title=output (mrad)> legend=<>",
+        "Line x=[-2 0 2 1] y=[-0.3 0.1 0.5 0.2] label=0.5 Hz",
+        "Line x=[-4 0 4 2] y=[-0.7 -0.1 0.6 0.5] colour=#0072B2 dash=-- label=25 Hz",
+        "Panel 0 1 x=<title=drive about the bias (V)> y=<title=output less line (µrad)>",
+        "Line x=[-2 0 2 1] y=[5.71429 22.8571 40 -68.5714] name=0.5 Hz",
+        "Line x=[-4 0 4 2] y=[2.85714 -88.5714 -80 165.714] colour=#0072B2 dash=-- name=25 Hz",
+    ]
+
+
+def test_errors_of_two_axes_have_the_rms_of_their_steady_part():
+    error = np.array([[9e-6, 1e-6], [3e-6, -2e-6], [-4e-6, 2e-6], [5e-6, -1e-6]])
+    assert lines_of(plots._errors(np.array([0.0, 0.5, 1.0, 1.5]), error, slice(1, 3))) == [
+        "Sheet width=6.4 height=3.4",
+        ("Panel 0 0 x=<title=time (s)> y=<title=pointing error (µrad)> legend=<place=above columns=3>"),
+        "Span low=0.5 high=1 upright=True colour=#56B4E9 opacity=0.25 label=steady part",
+        "Line x=[0 0.5 1 1.5] y=[9 3 -4 5] colour=#0072B2 width=0.8 label=axis 1: rms 3.54 µrad",
+        ("Line x=[0 0.5 1 1.5] y=[1 -2 2 -1] colour=#D55E00 dash=-- width=0.8 label=axis 2: rms 2.00 µrad"),
+    ]
+
+
+def test_spectra_of_two_axes_are_drawn_without_their_first_and_last_line():
+    freq = np.arange(6.0) * 2.0
+    density = np.array([[9e9, 9e9], [4e-12, 1e-12], [2e-12, 8e-12], [1e-12, 4e-12], [5e-13, 2e-12], [9e9, 9e9]])
+    assert lines_of(plots._left_spectrum(SimpleNamespace(freq_hz=freq, psd_rad2_hz=density))) == [
+        "Sheet width=7.6 height=4.3 widths=[1.45 1] legend=<place=above columns=3>",
+        "Panel 0 0 x=<title=frequency (Hz) log=True low=2 high=8> y=<title=spectrum of one axis",
+        "  (µrad²/Hz) log=True>",
+        "Line x=[2 4 6 8] y=[4 2 1 0.5] colour=#0072B2 label=axis 1",
+        "Line x=[2 4 6 8] y=[1 8 4 2] colour=#D55E00 dash=-- label=axis 2",
+        ("Panel 0 1 x=<title=frequency (Hz) log=True low=2 high=8> y=<title=rms below that frequency, one"),
+        "  axis (µrad) low=0>",
+        "Line x=[2 4 6 8] y=[2.82843 3.4641 3.74166 3.87298] colour=#0072B2 name=axis 1",
+        "Line x=[2 4 6 8] y=[1.41421 4.24264 5.09902 5.47723] colour=#D55E00 dash=-- name=axis 2",
+    ]
+
+
+def test_responses_of_two_outputs_and_one_input_have_titles_and_units_of_their_own():
+    value = np.array([1.0, -2.0j, -0.5])[:, None, None] * np.array([[1.0], [4.0]])
+    found = SimpleNamespace(
+        freq_hz=np.array([1.0, 10.0, 100.0]),
+        response=value,
+        standard_error=0.1 * np.abs(value),
+        output_names=("tip", "tilt"),
+        input_names=("piezo",),
+    )
+    assert lines_of(plots._measured_bode(found)) == [
+        "Sheet width=6.4 height=9.2 heights=[1.4 1 1.4 1] share_x=True",
+        ("Panel 0 0 x=<log=True> y=<title=gain (output/input) log=True> title=tip from piezo legend=<>"),
+        ("Area rings=[[[1 0.861407] [10 1.72281] [100 0.430704] [100 0.569296] [10 2.27719] [1 1.13859]]]"),
+        "  colour=#56B4E9 opacity=0.6 label=95 % confidence",
+        "Line x=[1 10 100] y=[1 2 0.5] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        "Panel 1 0 x=<title=frequency (Hz) log=True> y=<title=phase (°) low=-200 high=20>",
+        "Area rings=[[[1 -7.96643] [10 -97.9664] [100 -187.966] [100 -172.034] [10 -82.0336] [1",
+        "  7.96643]]] colour=#56B4E9 opacity=0.6",
+        "Line x=[1 10 100] y=[0 -90 -180] colour=#0072B2 dash= marker=. size=4.5",
+        "Panel 2 0 x=<log=True> y=<title=gain (output/input) log=True> title=tilt from piezo",
+        ("Area rings=[[[1 3.44563] [10 6.89126] [100 1.72281] [100 2.27719] [10 9.10874] [1 4.55437]]]"),
+        "  colour=#56B4E9 opacity=0.6 label=95 % confidence",
+        "Line x=[1 10 100] y=[4 8 2] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        "Panel 3 0 x=<title=frequency (Hz) log=True> y=<title=phase (°) low=-200 high=20>",
+        "Area rings=[[[1 -7.96643] [10 -97.9664] [100 -187.966] [100 -172.034] [10 -82.0336] [1",
+        "  7.96643]]] colour=#56B4E9 opacity=0.6",
+        "Line x=[1 10 100] y=[0 -90 -180] colour=#0072B2 dash= marker=. size=4.5",
+    ]
+
+
+def test_residuals_of_a_table_leave_out_its_value_at_rest():
+    model = np.array([1.0, 2.0, 4.0])[:, None, None] * np.array([[1.0, 3.0]])
+    fit = SimpleNamespace(freq_hz=np.array([0.0, 2.0, 8.0]), residual=0.125 * model, response=lambda freq: model)
+    assert lines_of(plots._fit_residual(fit)) == [
+        "Sheet width=6.8 height=3 widths=[1 1] share_x=True",
+        ("Panel 0 0 x=<title=frequency (Hz) log=True> y=<title=size (output/input) log=True> title=output"),
+        "  1 from input 1 legend=<>",
+        "Line x=[2 8] y=[2.25 4.5] colour=#0072B2 dash= label=table marker=. size=4.5",
+        "Line x=[2 8] y=[0.25 0.5] colour=#E69F00 dash= label=table less model marker=. size=4.5",
+        ("Panel 0 1 x=<title=frequency (Hz) log=True> y=<title=size (output/input) log=True> title=output"),
+        "  1 from input 2",
+        "Line x=[2 8] y=[6.75 13.5] colour=#0072B2 dash= label=table marker=. size=4.5",
+        "Line x=[2 8] y=[0.75 1.5] colour=#E69F00 dash= label=table less model marker=. size=4.5",
+    ]
+
+
+def test_contacts_are_drawn_from_the_first_rise_to_the_last_set():
+    contacts = [SimpleNamespace(start_s=s, end_s=e) for s, e in ((7200.0, 9000.0), (3600.0, 12600.0), (100.0, 200.0))]
+    assert lines_of(plots._contacts(contacts)) == [
+        "Sheet width=7.6 height=1.07",
+        ("Panel 0 0 x=<title=hours since the epoch low=0.0277778 high=3.5 ticks=[0.5 1 1.5 2 2.5 3 3.5]>"),
+        "  y=<low=0.6 high=-0.6 ticks={0: contacts} grid=False>",
+        "Bars at=[0 0 0] start=[2 1 0.0277778] end=[2.5 3.5 0.0555556] breadth=[0.68 0.68 0.68]",
+        "  colour=#0072B2 edge=#0072B2",
+        "Words text=3 · 3.03 h x=1 y=0 size=9 shift=[5 0] of_panel=x",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "now", "before", "found"),
+    [
+        ((None, None), (1.0, 2.0), None, None),
+        ((0.5, None), (1.0, 2.0), None, (0.5, 2.0)),
+        ((None, None), (1.0, 2.0), (1.5, 9.0), (1.0, 9.0)),
+        ((3.0, 4.0), (1.0, 2.0), (3.5, 3.75), (3.0, 4.0)),
+        ((4.0, 3.0), (1.0, 2.0), (0.0, 9.0), (4.0, 3.0)),
+        ((3.0, 4.0), (1.0, 2.0), (9.0, 0.0), (3.0, 4.0)),
+    ],
+)
+def test_limits_are_widened_to_those_of_what_was_there_before(given, now, before, found):
+    assert renderer._ends(Axis(low=given[0], high=given[1]), now, before) == found
+
+
+def test_a_logarithmic_axis_takes_no_limit_that_is_not_positive():
+    assert renderer._ends(Axis(log=True, low=0.0, high=7.0), (1.0, 2.0), None) == (1.0, 7.0)
+    assert renderer._ends(Axis(log=True, low=-1.0), (1.0, 2.0), None) is None

@@ -1293,7 +1293,7 @@ def a_comparison(k, obtained, quantity=MARGIN):
 
 
 def unlike():
-    """Five checks: measured and published ones that hold, one that fails twice, one that broke, one without its data."""
+    """Five checks: measured and published ones that hold, one that fails twice, one broken, one without its data."""
     outcomes = (
         check.Outcome(a_check(1, Referent.MEASUREMENT), (a_comparison(1, 10.25), a_comparison(2, 20.0))),
         check.Outcome(a_check(2, Referent.PUBLISHED), (a_comparison(3, -30.0 + 60.25, MODULUS),)),
@@ -1804,7 +1804,7 @@ def test_the_band_of_a_drive_is_of_whole_periods_and_of_each_channel():
     }
 
 
-# ------------------------------------------------------------------------------------------- what the signs stand beside
+# ----------------------------------------------------------------------------------------- what the signs stand beside
 DOMAINS = {
     "Loops": {"extents": {"loop.rate": {"least": 10.0, "most": 1000.0, "unit": "Hz"}}},
     "Links": {
