@@ -19,11 +19,15 @@ import several_axes
 from microrad.core import kernels, lti
 from microrad.export import choice
 from microrad.export.flight import c_code
+from microrad.export.flight import write as flight_write
+from microrad.export.flight.build import BenchResult
+from microrad.export.flight.operations import Operations
 from microrad.export.flight.rounding import RoundingBound, rounding_bound
+from microrad.export.flight.stack import StackUse
 from microrad.export.flight.write import export_flight
 from microrad.export.linear_part.modes import minimal
 from microrad.export.linear_part.sections import sections
-from microrad.export.records import ExportError, Origin, Signal
+from microrad.export.records import ExportError, FlightController, Origin, Signal
 from microrad.export.templating import comment, real, render, table, terms
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
@@ -993,3 +997,248 @@ def test_limits_in_single_precision_are_never_outside_of_the_controllers():
         assert -size <= least < -size * (1.0 - 2e-7) and size * (1.0 - 2e-7) < most <= size
         assert float(np.float32(most)) == most == -least
     assert held_to(-inf, inf, 0.0, "single")[:2] == (-inf, inf)
+
+
+# ------------------------------------------------------------------------------------------- words and places, whole
+def made_controller(**changes):
+    """A controller of two actuators and two signals, with limits, bias and margins unlike each other."""
+    given = {
+        "name": "PI \u00fcber alles",
+        "origin": Origin("a mission", "0123456789abcdef" * 4, "a mirror"),
+        "period_s": 4e-4,
+        "inputs": (Signal("tip_rad_s", 2, "rad/s", "a rate", 5.0), Signal("gauge_rad", 1, "rad", "a gauge", 0.1)),
+        "actuators": 2,
+        "system": lti.StateSpace(np.diag([0.5, 0.25]), np.ones((2, 3)), np.ones((2, 2)), np.zeros((2, 3))),
+        "anti_windup": np.zeros((2, 2)),
+        "inverse": None,
+        "minimum_v": -4.5,
+        "maximum_v": 7.25,
+        "resolution_v": 0.0025,
+        "bias_v": 6.125,
+        "margins": (("modulus margin", 0.5625, ""), ("gain margin", 7.5, "dB"), ("delay margin", 3.75e-4, "s")),
+    }
+    return FlightController(**given | changes)
+
+
+def made_export(**changes):
+    of = made_controller()
+    given = {
+        "folder": None,
+        "name": "pi_code",
+        "precision": "single",
+        "controller": of,
+        "left": Outlook(1.5e-6, 2.25e-6),
+        "form": SimpleNamespace(order=2, form="modal"),
+        "cost": Operations(multiplications=12, additions=9, divisions=1),
+        "bound": RoundingBound(3e-6, 900, 1e-10, "It stays within 3e-06 V."),
+        "fixed": None,
+        "samples": 900,
+        "bench": BenchResult(900, 2.5e-7, 3.5, 4e-6, 11, 12, 13, 14, 250.4, 120.6, 20.0, 2.5),
+        "stack": StackUse(192, ("exp", "pow")),
+    }
+    return SimpleNamespace(**given | changes)
+
+
+def test_the_report_of_an_export_has_each_number_on_its_own_line():
+    assert flight_write.report_text(made_export()).split("\n") == [
+        "pi_code: PI über alles in single precision",
+        "  from          a mission, sha256 0123456789abcdef",
+        "  mirror        a mirror",
+        "  controller    PI über alles, 2.5 kHz, 2 states in modal form",
+        "  reads         tip_rad_s[2], gauge_rad[1]",
+        "  commands      2 x -4.5 V to 7.25 V from the bias of 6.125 V, in counts of 2.5 mV",
+        "  margins       modulus margin 0.562, gain margin 7.5 dB, delay margin 375 µs",
+        "  leaves        1.5 µrad rms an axis in linear theory, 2.25 µrad rms an axis simulated",
+        "  a step costs  12 multiplications, 9 additions, 1 division",
+        ("  stack         192 bytes at most, from this machine's compiler, and what the C library takes in exp, pow"),
+        "  single        It stays within 3e-06 V.",
+        "  compiled, run 900 samples of the loop: at most 250 nV off the kernel (allowed: 4 µV)",
+        "  counters      11 saturated, 12 rate-clamped, 13 rejected, 14 faults",
+        "  time a step   250 ns at worst, 121 ns in the median, on this machine",
+        "  cycles        626 at worst, 302 in the median, of this machine's counter at 2.5 GHz",
+    ]
+    bare = made_export(precision="double", left=None, bound=None, stack=None, bench=None)
+    bare.controller = made_controller(resolution_v=0.0, minimum_v=-inf, maximum_v=inf)
+    assert flight_write.report_text(bare).split("\n") == [
+        "pi_code: PI über alles in double precision",
+        "  from          a mission, sha256 0123456789abcdef",
+        "  mirror        a mirror",
+        "  controller    PI über alles, 2.5 kHz, 2 states in modal form",
+        "  reads         tip_rad_s[2], gauge_rad[1]",
+        "  commands      2 x -inf V to inf V from the bias of 6.125 V",
+        "  margins       modulus margin 0.562, gain margin 7.5 dB, delay margin 375 µs",
+        "  a step costs  12 multiplications, 9 additions, 1 division",
+        ("  not compiled  there is no C compiler here (cc, gcc, clang); make in the folder builds the bench"),
+    ]
+    still = replace(made_export().bench, cycles_per_ns=0.0)
+    assert "cycles" not in flight_write.report_text(made_export(bench=still))
+
+
+def test_the_data_of_an_export_have_each_number_under_its_own_name():
+    assert flight_write.export_data(made_export()) == {
+        "name": "pi_code",
+        "controller": "PI über alles",
+        "precision": "single",
+        "mission_sha256": "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef",
+        "period_s": 0.0004,
+        "states": 2,
+        "form": "modal",
+        "inputs": [
+            {"name": "tip_rad_s", "size": 2, "unit": "rad/s", "limit": 5.0},
+            {"name": "gauge_rad", "size": 1, "unit": "rad", "limit": 0.1},
+        ],
+        "limits_v": [-4.5, 7.25],
+        "bias_v": 6.125,
+        "margins": {
+            "modulus margin": {"value": 0.5625, "unit": ""},
+            "gain margin": {"value": 7.5, "unit": "dB"},
+            "delay margin": {"value": 0.000375, "unit": "s"},
+        },
+        "residual": {"linear_rms_rad_per_axis": 1.5e-06, "simulated_rms_rad_per_axis": 2.25e-06},
+        "operations": {
+            "multiplications": 12,
+            "additions": 9,
+            "divisions": 1,
+            "comparisons": 0,
+            "exponentials": 0,
+            "logarithms": 0,
+            "powers": 0,
+            "roundings": 0,
+        },
+        "stack": {
+            "most_bytes": 192,
+            "library": (
+                "exp",
+                "pow",
+            ),
+        },
+        "bound": {"command_v": 3e-06, "samples": 900, "per_sample_v": 1e-10, "words": "It stays within 3e-06 V."},
+        "bench": {
+            "samples": 900,
+            "largest_difference_v": 2.5e-07,
+            "peak_command_v": 3.5,
+            "bound_v": 4e-06,
+            "saturated": 11,
+            "rate_clamped": 12,
+            "rejected": 13,
+            "faults": 14,
+            "worst_step_ns": 250.4,
+            "median_step_ns": 120.6,
+            "clock_ns": 20.0,
+            "cycles_per_ns": 2.5,
+        },
+    }
+    bare = flight_write.export_data(made_export(left=None, bound=None, stack=None, bench=None))
+    assert {key: value for key, value in bare.items() if value is None} == {
+        "residual": None,
+        "stack": None,
+        "bound": None,
+        "bench": None,
+    }
+
+
+def test_inputs_have_their_places_names_and_units_in_constants():
+    found = c_code._readings(made_controller().inputs)
+    assert [[each[key] for key in ("name", "first", "size", "NAME", "UNIT")] for each in found] == [
+        ["tip_rad_s", 0, 2, "TIP", "RAD_S"],
+        ["gauge_rad", 2, 1, "GAUGE", "RAD"],
+    ]
+    assert c_code._places(["a", "b", "c"], [2, 1, 3]) == "a 0 to 1, b 2, c 3 to 5"
+    assert c_code._places([], []) == ""
+
+
+def test_recorded_numbers_stand_below_the_names_of_three_readings_and_two_commands():
+    v = SimpleNamespace(
+        inputs=np.array([[0.1, 2.0, -3e-300], [1 / 3, 0.0, 5.0]]), commands=np.array([[1.0, -2.5], [7.0, 8.0]])
+    )
+    assert c_code.vectors_text(made_controller(), v).split("\n") == [
+        "tip_rad_s_0,tip_rad_s_1,gauge_rad_0,command_v_0,command_v_1",
+        "0.10000000000000001,2,-3.0000000000000002e-300,1,-2.5",
+        "0.33333333333333331,0,5,7,8",
+        "",
+    ]
+
+
+def test_signals_stand_one_behind_the_other_and_those_that_nothing_reads_are_left_out():
+    of = made_controller()
+    assert choice.columns(of.inputs) == {"tip_rad_s": slice(0, 2), "gauge_rad": slice(2, 3)}
+    B, D = np.zeros((2, 3)), np.zeros((2, 3))
+    D[1, 2] = 4.0
+    of = replace(of, system=lti.StateSpace(of.system.A, B, of.system.C, D))
+    made = choice.trimmed(of)
+    assert [each.name for each in made.inputs] == ["gauge_rad"]
+    assert (made.system.B.tolist(), made.system.D.tolist()) == ([[0.0], [0.0]], [[0.0], [4.0]])
+
+
+def test_margins_of_one_axis_and_of_all_have_their_units():
+    one = SimpleNamespace(modulus=0.5, gain_up=10.0, phase_rad=pi / 6.0, delay_s=3e-4)
+    assert [(name, round(value, 9), unit) for name, value, unit in choice._margins(one)] == [
+        ("modulus margin", 0.5, ""),
+        ("gain margin", 20.0, "dB"),
+        ("phase margin", 30.0, "deg"),
+        ("delay margin", 3e-4, "s"),
+    ]
+    several = SimpleNamespace(modulus=0.4, disk=SimpleNamespace(disk=0.7), bandwidth_hz=90.0)
+    assert choice._margins_of_all(several) == (
+        ("modulus margin of all axes", 0.4, ""),
+        ("disk margin of all axes", 0.7, ""),
+        ("bandwidth", 90.0, "Hz"),
+    )
+
+
+def test_a_controller_that_leaves_too_much_is_refused_with_both_figures_unless_accepted():
+    left = Outlook(1e-6, 4.5e-6)
+    chosen = SimpleNamespace(
+        left=left, controller=SimpleNamespace(name="quick PI"), source=SimpleNamespace(path="m.toml")
+    )
+    with pytest.raises(ExportError) as error:
+        choice.promised(chosen)
+    assert str(error.value) == (
+        "m.toml: quick PI leaves 4.5 µrad rms an axis on the mission's mirror, simulated "
+        "with its hysteresis: 4.50 times the 1 µrad rms an axis of linear theory, where "
+        "1.5 times is the most. Choose another controller by the simulated figures of "
+        "microrad design, or write this one all the same with --accept."
+    )
+    assert choice.promised(chosen, accept=True) is left
+
+
+@pytest.mark.parametrize(
+    ("text", "made"),
+    [
+        ("a */ b /* c", "a * / b / * c"),
+        ("a **// b", "a ** // b"),
+        ("??/ and \\ end", "? ?/ and / end"),
+        ("a\nb\tc\x00d", "a b c d"),
+        ("", ""),
+        ("w " * 70, f"{'w ' * 55}w\n * {'w ' * 13}w"),
+    ],
+)
+def test_a_comment_of_c_ends_nowhere_within(text, made):
+    found = comment(text, " * ")
+    assert "*/" not in found.replace("\n * ", "") and "/*" not in found and "??" not in found and "\\" not in found
+    assert found == made
+
+
+@pytest.mark.parametrize(
+    ("x", "precision", "said"),
+    [
+        (nan, "double", "a number of the exported code is nan: no literal of C stands for it; look for its origin"),
+        (1e39, "single", "1e+39 is beyond single precision, which ends at 3.403e+38: export double precision"),
+    ],
+)
+def test_a_number_without_a_literal_is_refused_in_all_its_words(x, precision, said):
+    with pytest.raises(ExportError, match=f"^{re.escape(said)}$"):
+        real(x, precision)
+
+
+def test_terms_begin_a_line_for_each_row_and_where_one_is_full():
+    many = [(3, j, 0.125) for j in range(9)] + [(4, 0, -2.0)]
+    assert terms(many, "single").split("\n") == [
+        (
+            "{3, 0, 0.125f}, {3, 1, 0.125f}, {3, 2, 0.125f}, {3, 3, 0.125f}, {3, 4, 0.125f}, "
+            "{3, 5, 0.125f}, {3, 6, 0.125f},"
+        ),
+        "    {3, 7, 0.125f}, {3, 8, 0.125f},",
+        "    {4, 0, -2.0f},",
+    ]
+    assert terms([]) == ""

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import math
 import os
 import shutil
 import signal
@@ -1056,3 +1057,87 @@ def test_nothing_in_it_is_undefined(archive, tmp_path):
     assert "runtime error" not in done.stderr
     said = [line for line in done.stdout.splitlines() if line.startswith(("done", "refused"))]
     assert len(said) == 8 and sum(line.startswith("done") for line in said) >= 6
+
+
+# ------------------------------------------------------------------------------------------ what a unit says of itself
+def spoken(unit, version):
+    return [
+        [
+            v.name,
+            v.place,
+            v.causality,
+            v.unit,
+            v.size,
+            None if v.start is None else [float(f"{x:.6g}") for x in v.start],
+        ]
+        for v in variables(unit, version)
+    ]
+
+
+def test_each_variable_of_a_plant_with_all_there_is_has_its_place_unit_and_start():
+    assert spoken(rich_unit(), "3.0") == [
+        ["time", "time_s", "independent", "s", None, None],
+        ["command_v", "command_v", "input", "V", 2, [0.0, 0.0]],
+        ["line_of_sight_rad", "line_of_sight_rad", "output", "rad", 3, None],
+        ["mirror_rad", "plant.y", "output", "rad", 2, None],
+        ["drive_v", "plant.u", "output", "V", 2, None],
+        ["rate_clamped", "plant.rate_clamped", "output", "", None, None],
+        ["slew_limited", "plant.slew_limited", "output", "", None, None],
+        ["faults", "plant.faults", "output", "", None, None],
+        ["amplifier_bandwidth_hz", "plant.amplifier_bandwidth_hz", "parameter", "Hz", None, [2000.0]],
+        ["amplifier_slew_v_s", "plant.amplifier_slew_v_s", "parameter", "V/s", None, [1000.0]],
+        ["bouc_wen[1].d1_rad_v", "plant.bouc_wen[0].d1", "parameter", "rad/V", None, [9e-05]],
+        ["bouc_wen[1].d2_s_v", "plant.bouc_wen[0].d2", "parameter", "s/V", None, [-3e-07]],
+        ["bouc_wen[1].epsilon_rad_v", "plant.bouc_wen[0].epsilon", "parameter", "rad/V", None, [-4.8e-05]],
+        ["bouc_wen[1].delta_s_v", "plant.bouc_wen[0].delta", "parameter", "s/V", None, [0.00047]],
+        ["bouc_wen[1].alpha_1_v", "plant.bouc_wen[0].alpha", "parameter", "1/V", None, [38.4]],
+        ["bouc_wen[1].beta_1_v", "plant.bouc_wen[0].beta", "parameter", "1/V", None, [34.6]],
+        ["bouc_wen[1].gamma_1_v", "plant.bouc_wen[0].gamma", "parameter", "1/V", None, [0.0]],
+        ["bouc_wen[1].eta_1_v", "plant.bouc_wen[0].eta", "parameter", "1/V", None, [0.0]],
+        ["bouc_wen[1].rate_limit_v_s", "plant.bouc_wen[0].rate_limit", "parameter", "V/s", None, [400.0]],
+        ["bouc_wen[1].bias_v", "plant.bouc_wen[0].bias", "parameter", "V", None, [6.0]],
+        ["bouc_wen[1].exponent", "plant.exponent[0]", "parameter", "", None, [1.0]],
+        ["bouc_wen[2].d1_rad_v", "plant.bouc_wen[1].d1", "parameter", "rad/V", None, [8e-05]],
+        ["bouc_wen[2].d2_s_v", "plant.bouc_wen[1].d2", "parameter", "s/V", None, [0.0]],
+        ["bouc_wen[2].epsilon_rad_v", "plant.bouc_wen[1].epsilon", "parameter", "rad/V", None, [-2e-05]],
+        ["bouc_wen[2].delta_s_v", "plant.bouc_wen[1].delta", "parameter", "s/V", None, [0.0]],
+        ["bouc_wen[2].alpha_1_v", "plant.bouc_wen[1].alpha", "parameter", "1/V", None, [2.4]],
+        ["bouc_wen[2].beta_1_v", "plant.bouc_wen[1].beta", "parameter", "1/V", None, [0.6]],
+        ["bouc_wen[2].gamma_1_v", "plant.bouc_wen[1].gamma", "parameter", "1/V", None, [0.1]],
+        ["bouc_wen[2].eta_1_v", "plant.bouc_wen[1].eta", "parameter", "1/V", None, [-0.2]],
+        ["bouc_wen[2].rate_limit_v_s", "plant.bouc_wen[1].rate_limit", "parameter", "V/s", None, [math.inf]],
+        ["bouc_wen[2].bias_v", "plant.bouc_wen[1].bias", "parameter", "V", None, [5.0]],
+        ["bouc_wen[2].exponent", "plant.exponent[1]", "parameter", "", None, [1.7]],
+        ["prandtl_ishlinskii[1].widening_s", "plant.widening_s[0]", "parameter", "s", None, [0.0002]],
+        ["prandtl_ishlinskii[1].rate_limit_v_s", "plant.rate_limit_v_s[0]", "parameter", "V/s", None, [300.0]],
+        ["prandtl_ishlinskii[1].threshold_v", "plant.threshold_v", "parameter", "V", 3, [0.0, 0.3, 0.9]],
+        ["prandtl_ishlinskii[1].weight_rad_v", "plant.weight", "parameter", "rad/V", 3, [5e-05, 2e-05, 1e-05]],
+        ["prandtl_ishlinskii[2].widening_s", "plant.widening_s[1]", "parameter", "s", None, [0.0]],
+        ["prandtl_ishlinskii[2].rate_limit_v_s", "plant.rate_limit_v_s[1]", "parameter", "V/s", None, [math.inf]],
+        ["prandtl_ishlinskii[2].threshold_v", "plant.threshold_v", "parameter", "V", 2, [0.0, 0.5]],
+        ["prandtl_ishlinskii[2].weight_rad_v", "plant.weight", "parameter", "rad/V", 2, [4e-05, 1e-05]],
+        ["bias_v", "constants[0]", "local", "V", None, [6.0]],
+        ["plant_step_s", "constants[1]", "local", "s", None, [2e-05]],
+    ]
+
+
+def test_gains_of_a_plant_that_counts_in_volts_have_other_names():
+    unit = replace(rich_unit(), element_unit="V", output_unit="m")
+    named = {name: unit_ for name, _, _, unit_, _, _ in spoken(unit, "3.0")}
+    usual = {name: unit_ for name, _, _, unit_, _, _ in spoken(rich_unit(), "3.0")}
+    assert {name: unit_ for name, unit_ in named.items() if usual.get(name) != unit_} == {
+        "mirror_m": "m",
+        "bouc_wen[1].d1": "",
+        "bouc_wen[1].epsilon": "",
+        "bouc_wen[2].d1": "",
+        "bouc_wen[2].epsilon": "",
+        "prandtl_ishlinskii[1].weight": "",
+        "prandtl_ishlinskii[2].weight": "",
+    }
+
+
+def test_arrays_are_their_elements_in_the_older_version_in_the_same_order():
+    new, old = spoken(rich_unit(), "3.0"), spoken(rich_unit(), "2.0")
+    assert len(old) == sum(each[4] or 1 for each in new)
+    starts = [x for each in new if each[5] is not None for x in each[5]]
+    assert [x for each in old if each[5] is not None for x in each[5]] == starts

@@ -33,6 +33,7 @@ from microrad.campaign.records import (
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.report.campaign import figures as drawing
 from microrad.report.campaign import numbers as campaign_numbers
+from microrad.report.campaign import optimum as optimum_report
 from microrad.report.campaign import page as campaign_module
 from microrad.report.campaign import tables as campaign_tables
 from microrad.report.campaign import text as campaign_terminal
@@ -2258,3 +2259,147 @@ def test_the_data_of_two_combinations_have_every_number_under_its_own_name():
         },
         "warnings": ["a warning"],
     }
+
+
+# ------------------------------------------------------------------------------------------------- an optimum, whole
+def kept_of(output, wanted, value, share, holds, agrees):
+    ends = Interval(share, share - 0.05, min(share + 0.025, 1.0), 0.95)
+    return SimpleNamespace(
+        limit=SimpleNamespace(output=output),
+        wanted=wanted,
+        value=value,
+        share=ends,
+        holds=holds,
+        agrees=lambda confidence: agrees,
+    )
+
+
+def an_optimum(**changes):
+    """Two variables, an output as cost, two limits; fresh rows miss one of them, within its interval."""
+    problem = SimpleNamespace(
+        minimise="-margin",
+        cost_name="margin",
+        cost_unit="dB",
+        confidence=0.9,
+        limits=(1, 2),
+        variables=(
+            SimpleNamespace(key="a.power", low=1.0, high=9.0, unit="W"),
+            SimpleNamespace(key="b.rate", low=2e3, high=5e5, unit="Hz"),
+        ),
+    )
+    first, second = ("margin", "margin >= 3 dB"), ("residual_quantile", "residual_quantile <= 9 urad")
+    best = SimpleNamespace(
+        cost=4.25,
+        values={"a.power": 2.5, "b.rate": 4e4},
+        kept=(kept_of(*first, 3.5, 0.975, True, True), kept_of(*second, 8e-6, 0.925, True, True)),
+    )
+    fresh = SimpleNamespace(
+        cost=4.125,
+        refused="",
+        kept=(kept_of(*first, 2.875, 0.875, False, True), kept_of(*second, math.nan, 0.95, True, True)),
+    )
+    given = {
+        "problem": problem,
+        "best": best,
+        "fresh": fresh,
+        "feasible": True,
+        "confirmed": True,
+        "reason": "",
+        "bound_by": ("a.power", "the limit of margin"),
+        "evaluations": 77,
+        "refused": 3,
+        "warnings": ("one", "two"),
+    }
+    return SimpleNamespace(**given | changes)
+
+
+def test_an_optimum_is_told_with_variables_costs_limits_and_what_binds_it():
+    assert optimum_report.optimum_text(an_optimum()).split("\n") == [
+        ("largest margin (mean over the rows): 4.25 dB, with each limit kept by at least 90 % of the searched rows"),
+        (
+            "Fresh rows keep margin ≥ 3 dB in 87.5 % (82.5 to 90 %), below 90 %: this agrees "
+            "within its interval; for slack draw more rows (optimise.rows) or ask for a larger "
+            "share (optimise.confidence)."
+        ),
+        "",
+        "variable  value   searched range",
+        "a.power   2.5 W   1 W to 9 W",
+        "b.rate    40 kHz  2 kHz to 500 kHz",
+        "",
+        "margin (mean over the rows): 4.25 dB of the searched rows, 4.12 dB of fresh rows",
+        "",
+        ("limit                       rows      value in the deciding row  share that keeps it  95 % interval"),
+        ("margin ≥ 3 dB               searched  3.50 dB                    97.5 %               92.5 to 100 %"),
+        ("residual_quantile ≤ 9 urad  searched  8 µrad                     92.5 %               87.5 to 95 %"),
+        ("margin ≥ 3 dB               fresh     2.88 dB                    87.5 %               82.5 to 90 %"),
+        ("residual_quantile ≤ 9 urad  fresh     failed                     95 %                 90 to 97.5 %"),
+        "deciding row: no row is worse but the 10 % that may miss the limit.",
+        "90 % (optimise.confidence) is the share of the rows that is to keep each limit.",
+        "",
+        "Bound by: a.power, the limit of margin",
+        "",
+        "77 candidates, 3 of them no mission",
+        "warning: one",
+        "warning: two",
+    ]
+
+
+def test_an_optimum_that_is_none_or_not_confirmed_says_so():
+    of = an_optimum(feasible=False, reason="no row keeps both", fresh=None, bound_by=(), refused=0, warnings=())
+    assert optimum_report.optimum_text(of).split("\n")[:9] == [
+        "NO DESIGN KEEPS THE LIMITS: no row keeps both",
+        "",
+        "The best of the designs tried:",
+        "",
+        "variable  value   searched range",
+        "a.power   2.5 W   1 W to 9 W",
+        "b.rate    40 kHz  2 kHz to 500 kHz",
+        "",
+        "margin (mean over the rows): 4.25 dB of the searched rows",
+    ]
+    alone = an_optimum(confirmed=False)
+    alone.fresh.kept[0].agrees = lambda confidence: False
+    alone.problem.minimise = alone.problem.cost_name = "b.rate"
+    alone.problem.cost_unit, alone.best.cost = "Hz", 4e4
+    assert optimum_report.optimum_text(alone).split("\n")[:6] == [
+        ("NOT CONFIRMED: least b.rate: 40 kHz, with each limit kept by at least 90 % of the searched rows"),
+        (
+            "Fresh rows keep margin ≥ 3 dB in 87.5 % (82.5 to 90 %), which is less often than "
+            "the 90 % wanted; for slack draw more rows (optimise.rows) or ask for a larger "
+            "share (optimise.confidence)."
+        ),
+        "",
+        "variable  value   searched range",
+        "a.power   2.5 W   1 W to 9 W",
+        "b.rate    40 kHz  2 kHz to 500 kHz",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"fresh": None}, "It has not been checked with fresh rows."),
+        ({"fresh": SimpleNamespace(refused="no such mirror", kept=())}, "Fresh rows refuse it: no such mirror."),
+        ({"fresh": SimpleNamespace(refused="", kept=())}, "There is no limit for fresh rows to check."),
+    ],
+)
+def test_what_fresh_rows_say_is_told_where_there_are_some(changes, said):
+    assert optimum_report.fresh_rows_sentence(an_optimum(**changes)) == said
+
+
+def test_fresh_rows_agree_where_each_limit_is_kept_and_its_interval_too():
+    of = an_optimum()
+    for kept in of.fresh.kept:
+        kept.holds = True
+    assert optimum_report.fresh_rows_sentence(of) == "Fresh rows agree."
+    of.fresh.kept[1].agrees = lambda confidence: False
+    assert optimum_report.fresh_rows_sentence(of) == (
+        "Fresh rows keep residual_quantile ≤ 9 urad in 95 % (90 to 97.5 %), below 90 %: "
+        "this agrees within its interval; for slack draw more rows (optimise.rows) or ask "
+        "for a larger share (optimise.confidence)."
+    )
+    assert optimum_report.fresh_rows_sentence(an_optimum(confirmed=False, fresh=of.fresh)) == (
+        "Fresh rows keep residual_quantile ≤ 9 urad in 95 % (90 to 97.5 %), which is less "
+        "often than the 90 % wanted; for slack draw more rows (optimise.rows) or ask for a "
+        "larger share (optimise.confidence)."
+    )
