@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drawn import lines_of
 from microrad import report
 from microrad.lab.identify.coupled import Candidate, CoupledIdentification
 from microrad.lab.identify.linear.amplitude import AmplitudeDependence
@@ -29,6 +30,7 @@ from microrad.report.identification.coupled_figures import MOST, bands, coupled_
 from microrad.report.identification.terminal import MOST_LINES
 from microrad.report.plotting.sheet import Area, Line, Rule, Span
 from microrad.report.tables import Cell
+from microrad.report.view import views_text
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ, PERIOD = 1000.0, 256
@@ -757,3 +759,128 @@ def test_bands_of_many_amplitudes_are_those_of_the_first_the_middle_and_the_last
         own = replace(found.candidate(), band_error_rms=np.ones((count, 2, 2)))
         titles = [panel.title for panel in bands(replace(found, candidates=(own,))).sheet.panels]
         assert [title.rpartition(", ")[2] for title in titles[::2]] == drives
+
+
+# --------------------------------------------------------------------------------- two channels unlike, as a whole
+def unlike_candidate(name, kind, parameters, share, note=""):
+    """A model whose errors differ by amplitude, band and output."""
+    error = share * OUTPUT_RMS * np.array([[1.0, 1.25], [1.5, 0.75]])
+    bands = np.stack([0.6 * error, 0.8 * error], axis=1) * np.array([1.0, 1.125])
+    made = candidate(name, kind, parameters, share, error, **({"note": note} if note else {}))
+    return replace(made, band_error_rms=bands, record_share=share * np.array([[0.5, 1.5], [2.0, 1.25]]))
+
+
+def unlike_found(**changes):
+    return found_of(
+        candidates=(
+            unlike_candidate("per axis, order 2", "per axis", 11, 0.523),
+            unlike_candidate("coupled linear, order 3", "coupled linear", 17, 0.2171, "its search had not settled"),
+            unlike_candidate("hysteretic stiffness, order 3", "hysteretic stiffness", 47, 0.0523),
+            unlike_candidate("hysteretic stiffness, order 5", "hysteretic stiffness", 81, 0.0517),
+        ),
+        **changes,
+    )
+
+
+def test_the_amplitudes_and_records_of_unlike_errors_have_each_its_own_number():
+    found = unlike_found()
+    rows = [[str(cell) for cell in row] for row in coupled_page._amplitudes(found).rows]
+    assert [row[:4] + row[6:] for row in rows] == [
+        ["100 mV", "1580", "99.6", "5.92 %", "y1, 6.54 %"],
+        ["200 mV", "3160", "157", "6.2 %", "<b>sensor</b>, 7.84 %"],
+    ]
+    shown = [coupled_page._records(found), coupled_page._candidates(found), coupled_page._poles(found.candidate())]
+    assert [[[str(cell) for cell in row] for row in each.rows] for each in shown] == [
+        [["small <3>.npy", "5.85 %", "2.61 %", "7.84 %"], ["large <3>.npy", "8.72 %", "10.5 %", "6.54 %"]],
+        [
+            ["hysteretic stiffness, order 5", "81", "5.17 %", "5.85 %", "6.13 %", "within noise"],
+            ["hysteretic stiffness, order 3", "47", "5.23 %", "5.92 %", "6.2 %", "chosen"],
+            ["coupled linear, order 3", "17", "22 %", "25 %", "26 %", ""],
+            ["per axis, order 2", "11", "52.3 %", "59.2 %", "62 %", ""],
+        ],
+        [["pair", "79.64", "0.32", "0.04", "0.002", "yes", ""], ["real pole", "143.2", "4.8", "1", "", "yes", ""]],
+    ]
+    assert views_text([coupled_page._dependence(found, {})], 100).split("\n") == [
+        "Dependence on the amplitude",
+        "",
+        ("From the smallest to the largest amplitude the gain changes by +5.2 % and the main resonance by"),
+        "−1.38 Hz.",
+        "",
+        " drive, rms   gain (µm/V)   main resonance (Hz)   ± (Hz)   damping ratio",
+        " ───────────────────────────────────────────────────────────────────────",
+        " 100 mV       2             79.58                 0.2      0.04",
+        " 200 mV       2.104         78.2                  0.1      0.04",
+    ]
+    assert [[str(cell) for cell in row] for row in coupled_page._range(found.candidate()).rows] == [
+        ["piezo 1", "5 V", "4.25 V", "5.75 V", "15 kV/s"],
+        ["piezo 2", "4 V", "3.5 V", "4.5 V", "10 kV/s"],
+    ]
+
+
+def test_the_bands_of_unlike_errors_have_a_row_for_each_amplitude_and_output():
+    rows = [row for row in coupled_page._bands(unlike_found()).rows if row[1] == "error"]
+    assert [list(row) for row in rows] == [
+        ["100 mV, <b>sensor</b>", "error", "31.4", "41.8"],
+        ["100 mV, y1", "error", "88.3", "118"],
+        ["200 mV, <b>sensor</b>", "error", "94.1", "126"],
+        ["200 mV, y1", "error", "106", "141"],
+    ]
+
+
+def test_all_that_is_said_of_unlike_errors():
+    found = unlike_found()
+    said = [*words.verdict(found), words.delay_text(found.candidate()), *words.not_held(found)]
+    assert said == [
+        (
+            "Hysteretic stiffness, order 3 (47 parameters) predicts 2 records that no fit has "
+            "seen with an error of 5.23 % of the rms output."
+        ),
+        (
+            "It leaves 99.6 nm rms (5.92 % of the output) at 100 mV rms drive and 157 nm rms "
+            "(6.2 % of the output) at 200 mV rms drive."
+        ),
+        "The worst is <b>sensor</b> of large <3>.npy: 10.5 %.",
+        "This rests on small <3>.npy and large <3>.npy; 6 other records were fitted.",
+        "The smaller of two whose difference may be chance.",
+        (
+            "The drive acts 200 µs ± 5 µs late. That delay belongs to the recording chain "
+            "(converters, filters, amplifier), not to the mirror: the mirror file holds it "
+            "apart."
+        ),
+        ("Creep: nothing below 3.9 Hz was excited, so what the mirror does within minutes of a step was not seen."),
+        "Modes above 400 Hz: nothing was excited there.",
+        (
+            "A geometry: where the displacements are measured was not stated, so tilts and "
+            "piston cannot be had from them."
+        ),
+        (
+            "Which way round the channels are: a reversed sensor and two swapped channels are "
+            "another mirror, and show only against signs that are stated, or against the "
+            "places of four sensors or more."
+        ),
+        "Uncertainty: standard errors of the parameters are not known.",
+    ]
+
+
+def test_the_figures_of_unlike_errors_have_a_point_for_each_model_and_a_curve_for_each_band():
+    found = unlike_found()
+    figure = coupled_figures_module.error_over_parameters(found)
+    kept = [line for line in lines_of(figure.sheet) if not line.startswith("Rule")]
+    assert [line for line in kept if line.startswith(("Line", "Span", "Panel"))] == [
+        ("Panel 0 0 x=<title=parameters (1) log=True> y=<title=error on held-out records (% of rms output)"),
+        ("Span low=5.17 high=5.23 upright=False colour=#009E73 opacity=0.25 label=within noise of the best"),
+        "Line x=[11] y=[52.3] colour=#56B4E9 dash=: width=0.7 label=per axis marker=s size=7",
+        "Line x=[17] y=[21.71] colour=#0072B2 dash=: width=0.7 label=coupled linear marker=o size=7",
+        ("Line x=[47 81] y=[5.23 5.17] colour=#D55E00 dash=: width=0.7 label=hysteretic stiffness marker=^"),
+        "Line x=[47] y=[5.23] dash= label=chosen marker=o size=11 face= edge=#000000",
+    ]
+    lines = [line for line in lines_of(coupled_figures_module.bands(found).sheet) if "colour=#D55E00" in line]
+    assert len(lines) == 4
+    assert lines_of(coupled_figures_module.amplitude(found.dependence, "m").sheet) == [
+        "Sheet width=8.2 height=2.8 widths=[1 1]",
+        "Panel 0 0 x=<title=drive, rms (mV) most=6> y=<title=gain (µm/V) most=6>",
+        "Line x=[100 200] y=[2 2.104] colour=#0072B2 dash=: width=0.8 marker=o",
+        "Panel 0 1 x=<title=drive, rms (mV) most=6> y=<title=main resonance (Hz) most=6>",
+        ("Line x=[100 200] y=[79.58 78.2] colour=#0072B2 dash=: width=0.8 marker=o y_arms=[[0.2 0.1] [0.2"),
+        "  0.1]]",
+    ]

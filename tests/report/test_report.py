@@ -811,3 +811,208 @@ def test_the_data_rate_of_this_mission_keeps_its_digits_below_the_papers(rate_bi
     mission = SimpleNamespace(name="ours", communication=SimpleNamespace(data_rate_bit_s=rate_bit_s))
     table = paper_views.projects_table(SimpleNamespace(file=SimpleNamespace(mission=mission)))
     assert table.rows[-1] == ("", "this mission: ours", "", words, "")
+
+
+# --------------------------------------------------------------------------------------- the chain and its contributors
+def ns(**values):
+    return SimpleNamespace(**values)
+
+
+def a_swing(key, unit, swing_db):
+    return ns(key=key, unit=unit, swing_db=swing_db)
+
+
+def chain_study(**changes):
+    """What the chain shows of a study without a fine loop, each number unlike the others."""
+    m = ns(
+        communication=ns(data_rate_bit_s=622.08e6, transmit_power_w=2.5, pointing_error_rad=7.5e-6),
+        range_m=lambda link: 4.25e7,
+        point_ahead=None,
+        jitter=ns(rms_rad=(1e-6, 1e-6)),
+        requirement=ns(pointing_error_rad=9e-6, residual_statistic="peak", margin_db=3.5),
+        amplifier=ns(output_max_v=110.0, output_min_v=-10.0, gain=10.0),
+        control=ns(rate_hz=12500.0),
+    )
+    day = ns(
+        encounters=[ns(range_most_m=3e7), ns(range_most_m=4.5e7)],
+        relay=ns(contacts=range(7), contact_s=9000.0, capacity_bit=8e12, arrived_bit=4e12),
+        direct=ns(capacity_bit=1.6e12),
+        optical=ns(capacity_bit=2.4e12),
+        view=ns(days=1.5, partner="station"),
+    )
+    given = {
+        "file": ns(mission=m, sources={}),
+        "links": ns(data=ns(beam=ns(fall=ns(half_angle_rad=2.1e-5)))),
+        "static": ns(margin_db=4.25),
+        "open_loop": ns(rss_rad=3.1e-4, beacon_half_angle_rad=4.5e-4, reading=ns(coverage=0.875)),
+        "fine_pointing": None,
+        "fine_case": None,
+        "requirements": [ns(subject="cone", mark="PASS", met=True), ns(subject="residual", mark="FAIL", met=False)],
+        "loops": [ns(freq_hz=80.0, width=0.15), ns(freq_hz=0.5, width=0.025), ns(freq_hz=10.0, width=0.05)],
+        "summary": ns(model=None),
+        "residual": ns(controller="PID", freq_hz=25.0),
+        "margins": ns(modulus=0.4375),
+        "left_rad": lambda run: 1.21e-5,
+        "day": day,
+        "margin_map": ns(largest_rate_bit_s=1.2e9),
+        "margin_db": -1.125,
+        "met": False,
+    }
+    return ns(**given | changes)
+
+
+def test_the_chain_of_a_station_with_optical_downlinks_has_each_number_in_its_box(monkeypatch):
+    monkeypatch.setattr(chain, "output_amplitude", lambda model, half_v: 1e-4 * half_v)
+    monkeypatch.setattr(chain, "with_sign", lambda text, sources, name: f"{text} <{name}>")
+    assert [[box.name, list(box.lines), box.mark] for box in chain.stages(chain_study())] == [
+        ["Orbit", ["7 contacts in 36 h", "150 min in view of the station", "42500 km, up to 45000 km"], ""],
+        [
+            "Link",
+            [
+                "622.1 Mbit/s with 2.5 W",
+                "beam 21 µrad (half, 1/e²)",
+                "static margin +4.25 dB <margin_db.communication_static> as budgeted,",
+                "at 7.5 µrad off axis",
+            ],
+            "",
+        ],
+        [
+            "Pointing",
+            ["open loop 310 µrad (rss)", "beacon's cone 450 µrad, covers 87.5 %", "fine: 9 µrad allowed"],
+            "PASS",
+        ],
+        ["Mirror", ["reach 1.2 mrad over 12 V", "hysteresis 2.5 % at 0.5 Hz,", "15.0 % at 80 Hz"], ""],
+        ["Loop", ["PID at 12.5 kHz", "modulus margin 0.44"], ""],
+        ["Residual", ["12.1 µrad peak, 25 Hz sine", "allowed 9 µrad"], "FAIL"],
+        [
+            "Volume",
+            [
+                "1 TB <day.relay.could_carry_bit> possible by the station",
+                "500 GB <day.relay.arrived_bit> of the instrument's",
+                "200 GB <day.direct.could_carry_bit> direct to ground",
+                "300 GB <day.optical.could_carry_bit> by optical stations",
+            ],
+            "",
+        ],
+        [
+            "Verdict",
+            ["1 of 2 requirements met", "link at the residual −1.12 dB <margin_db.judged>,", "3.5 dB required"],
+            "FAIL",
+        ],
+    ]
+    bare = chain_study(day=None, loops=[])
+    assert [list(box.lines) for box in chain.stages(bare) if box.name in ("Orbit", "Mirror", "Volume")] == [
+        ["42500 km as budgeted"],
+        ["reach 1.2 mrad over 12 V"],
+        ["up to 1.2 Gbit/s", "no orbits given: no volume a day"],
+    ]
+    nothing = chain_study(day=None, margin_map=ns(largest_rate_bit_s=math.nan))
+    assert chain._volume(nothing).lines[0] == "no rate has the required margin"
+
+
+def test_the_residual_of_the_chain_passes_where_it_and_the_budget_do():
+    kept = [ns(subject="residual", met=True), ns(subject="error budget", met=True), ns(subject="cone", met=False)]
+    box = chain._residual(chain_study(requirements=kept))
+    assert (box.mark, box.lines[-1]) == ("PASS", "error budget: 1 of 1 kept")
+    missed = [*kept, ns(subject="error budget", met=False)]
+    box = chain._residual(chain_study(requirements=missed))
+    assert (box.mark, box.lines[-1]) == ("FAIL", "error budget: 1 of 2 kept")
+
+
+@pytest.mark.parametrize(
+    ("swings", "said"),
+    [
+        ([("a.b", "W", 2.5)], "; the margin moves most with a.b: 2.50 dB for ±10 %"),
+        ([("a.b", "dB", math.inf), ("c.d", "dBm", 1.25)], "; the margin moves most with c.d: 1.25 dB for ±0.5 dB"),
+        (
+            [("code.bit_error_ratio", "", 0.5)],
+            "; the margin moves most with code.bit_error_ratio: 0.50 dB for ten times",
+        ),
+        ([("a.b", "W", math.nan)], ""),
+        ([], ""),
+    ],
+)
+def test_what_moves_a_margin_most_is_told_by_how_it_is_moved(swings, said):
+    found = requirement_views.most_sensitive([a_swing(*each) for each in swings])
+    assert found.startswith(said) and bool(found) is bool(said)
+
+
+def test_the_largest_loss_is_one_that_a_design_can_change():
+    lines = [
+        ns(name="Free space loss", unit="dB", value=-290.0),
+        ns(name="Transmitted power", unit="dBm", value=-300.0),
+        ns(name="Receiver optics", unit="dB", value=-2.5),
+        ns(name="Pointing loss", unit="dB", value=-6.25),
+    ]
+    lines[0].name = requirement_views.FREE_SPACE_LOSS
+    assert requirement_views.largest_loss(ns(lines=lines)) == "Pointing loss 6.25 dB"
+
+
+def stroke_study(*, margin_rad, values=(3e-4, 7e-5), ratio=0.5):
+    lines = [ns(name=name, value=value) for name, value in zip(("Body pointing", "Point-ahead"), values, strict=True)]
+    axis = ns(lines=lines, margin_rad=margin_rad, mirror_per_line_of_sight=ratio, name="x")
+    other = ns(lines=lines[::-1], margin_rad=margin_rad + 1e-3, mirror_per_line_of_sight=1.0, name="y")
+    table = ns(body=ns(error_rad=1.5e-4), reference=ns(point_ahead_rad=8e-5))
+    scene = ns(own_stroke=(other, axis))
+    return ns(file=ns(mission=ns(fine_pointing=table)), fine_pointing=ns(scene=scene))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"margin_rad": -5e-5}, "; to meet it, take fine_pointing.body.error = 100 µrad or less"),
+        ({"margin_rad": -2e-4}, "; to meet it, raise mirror.travel"),
+        (
+            {"margin_rad": -1e-5, "values": (1e-5, 1e-4)},
+            "; to meet it, take fine_pointing.reference.point_ahead = 64 µrad or less",
+        ),
+    ],
+)
+def test_a_stroke_is_advised_by_its_largest_line_on_the_axis_that_has_least(changes, said):
+    missed = Requirement("stroke", "stroke", "rad", 5e-4, 6e-4, -1e-4, "")
+    assert requirement_views.advice(stroke_study(**changes), missed) == said
+
+
+@pytest.mark.parametrize(
+    ("subject", "limited_by", "said"),
+    [
+        ("residual", "the amplifier's slew limit", "raise amplifier.slew"),
+        ("residual", "the amplifier's output limits", "raise amplifier.output_max"),
+        ("residual", "lag", "raise control.integral"),
+        ("fine pointing", "OLYMPUS", "raise fine_pointing.rate"),
+        ("fine pointing", requirement_views.OPTICAL_NOISE, "change fine_pointing.optical_sensor"),
+        ("fine pointing", requirement_views.GAUGE_NOISE, "change fine_pointing.strain_gauge"),
+    ],
+)
+def test_what_is_advised_follows_from_what_limits_it(subject, limited_by, said):
+    missed = Requirement(subject, "r", "rad", 1e-5, 2e-5, -1e-5, limited_by)
+    assert requirement_views.advice(stroke_study(margin_rad=1.0), missed) == f"; to meet it, {said}"
+    assert requirement_views.advice(stroke_study(margin_rad=1.0), replace(missed, unknown="a noise")) == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "stated", "allowed", "said"),
+    [
+        ("random", {"size_rad": 4e-6}, 0.5, "; to meet it, take error_budget.sources.a"),
+        ("drift", {"size_rad": 9e-6, "rate_rad_s": 4e-9}, 0.25, "; to meet it, take error_budget.sources.a"),
+        ("random", {"size_rad": 4e-6}, 0.0, "; to meet it, change error_budget.sources.a"),
+        ("random", {"size_rad": 4e-6}, math.inf, "; to meet it, change error_budget.sources.a"),
+    ],
+)
+def test_a_source_of_errors_is_advised_so_many_times_its_size(kind, stated, allowed, said):
+    missed = Requirement("error budget", "total", "rad", 1e-5, 2e-5, -1e-5, "a")
+    share = ns(name="a", allowed=allowed, contribution=ns(kind=kind))
+    other = ns(name="b", allowed=3.0, contribution=ns(kind="loop"))
+    first = Requirement("error budget", "first", "rad", 1e-5, 5e-6, 5e-6, "b")
+    of = ns(
+        requirements=[first, ns(subject="cone"), missed],
+        error_budget=ns(judged=[ns(shares=[other]), ns(shares=[share])]),
+        file=ns(mission=ns(error_budget=ns(sources={"a": ns(kind=kind, **stated)}))),
+    )
+    found = requirement_views.advice(of, missed)
+    assert found.startswith(said)
+    if allowed == 0.5:
+        assert found.endswith("= 2 µrad or less")
+    if allowed == 0.25:
+        assert found.endswith("= 1 nrad/s or less")
+    assert requirement_views.advice(of, first) == "; to move it, raise fine_pointing.rate"
