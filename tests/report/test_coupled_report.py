@@ -874,8 +874,13 @@ def test_the_figures_of_unlike_errors_have_a_point_for_each_model_and_a_curve_fo
         ("Line x=[47 81] y=[5.23 5.17] colour=#D55E00 dash=: width=0.7 label=hysteretic stiffness marker=^"),
         "Line x=[47] y=[5.23] dash= label=chosen marker=o size=11 face= edge=#000000",
     ]
-    lines = [line for line in lines_of(coupled_figures_module.bands(found).sheet) if "colour=#D55E00" in line]
-    assert len(lines) == 4
+    drawn = [
+        [[*line.y] for line in panel.all_of(Line) if line.label == "measured less modelled"]
+        for panel in coupled_figures_module.bands(found).sheet.panels
+    ]
+    expected = [(0.6, 0.8), (1.6875, 2.25), (1.8, 2.4), (2.025, 2.7)]
+    for (curve,), (low, high) in zip(drawn, expected, strict=True):
+        assert curve == pytest.approx(52.3 * np.array([low, low, high, high]), rel=1e-6)
     assert lines_of(coupled_figures_module.amplitude(found.dependence, "m").sheet) == [
         "Sheet width=8.2 height=2.8 widths=[1 1]",
         "Panel 0 0 x=<title=drive, rms (mV) most=6> y=<title=gain (µm/V) most=6>",
