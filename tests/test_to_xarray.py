@@ -81,3 +81,10 @@ def test_values_are_found_by_their_names():
 def test_texts_have_the_unit_1():
     (found,) = variables("input", name=(TEXT, "what an input is called", ["first", "second"])).values()
     assert (found.units, found.values.tolist()) == ("1", ["first", "second"])
+
+
+def test_what_is_not_there_is_no_number():
+    found = variables("place", limit=("rad", "limit", [2e-6, None]), name=(TEXT, "name", ["a", None]))
+    assert found["limit"].values.dtype == float
+    assert_array_equal(found["limit"].values, [2e-6, np.nan])
+    assert [*found["name"].values] == ["a", None]

@@ -575,3 +575,10 @@ def test_the_loop_depends_on_its_own_tables_and_on_light_where_it_has_a_quad_cel
         assert keys.touches_loop(key, whole.model_copy(update={"fine_pointing": fine})) is expected
     assert keys.touches_loop(key, whole.model_copy(update={"fine_pointing": None})) is touches
     assert keys.touches_loop(key, SimpleNamespace()) is False  # links alone
+
+
+def test_a_limit_that_nothing_checks_is_told_as_it_was_given():
+    required = SimpleNamespace(margin_db=3.0625, pointing_error_rad=12.3456e-6)
+    margin, error = checks.unchecked([], ["margin", "residual_quantile"], required, [])
+    assert margin.endswith('[limits.margin] with least = "3.0625 dB" checks it')
+    assert error.endswith('[limits.residual_quantile] with most = "12.3456 µrad" checks it')

@@ -1,10 +1,13 @@
 """Excitation design: spectra, orthogonality and whole periods as asked for, and refusals that say what would fit."""
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from microrad.core.units import parse_quantity
 from microrad.lab.bench.excitation import (
     DesignError,
     Limits,
@@ -338,3 +341,27 @@ def test_slew_counts_the_step_from_period_to_period():
             tones(two_inputs(inputs=1, slew_v_s=steepest * 0.9999), lines=line, seed=seed)
         tones(two_inputs(inputs=1, slew_v_s=steepest * 1.0001), lines=line, seed=seed)
     assert at_the_seam > 0
+
+
+@pytest.mark.parametrize(("rate_hz", "fewest"), [(622.08, 9.3), (1234.56, 7.77), (10e3, 10.0)])
+def test_what_a_refusal_says_would_do_does(rate_hz, fewest):
+    """The nearest of four digits is refused again every other time."""
+    limits = Limits(rate_hz, -3.5, 9.25, 7e5, fewest, 2)
+
+    def taken(start_hz, stop_hz, duration_s, within=limits):
+        sizes = {"amplitude_v": 1.0, "offset_v": 2.0}
+        return logarithmic_chirp(within, start_hz=start_hz, stop_hz=stop_hz, duration_s=duration_s, **sizes)
+
+    def refused(*asked):
+        with pytest.raises(DesignError) as caught:
+            taken(*asked)
+        return re.findall(r"(?:at most|at least) (\S+ [^\s,]+)", str(caught.value))
+
+    (most,) = refused(1.0, 10.0, 1e9)
+    assert 0 <= 1e7 - samples_in(limits, "c", "duration", parse_quantity(most, "s")) < 1e4
+    most, rate = refused(1.0, 0.6 * rate_hz, 2.0)
+    fast = taken(1.0, parse_quantity(most, "Hz"), 2.0)
+    assert fast.samples == round(2.0 * rate_hz)
+    assert taken(1.0, 0.6 * rate_hz, 2.0, replace(limits, rate_hz=parse_quantity(rate, "Hz"))).samples > fast.samples
+    (least,) = refused(rate_hz / 7e7, 10.0, 2.0)
+    assert taken(rate_hz / 7e7, 10.0, parse_quantity(least, "s")).samples > fast.samples

@@ -8,7 +8,11 @@ import pytest
 
 from microrad.core import lti
 from microrad.lab.identify.linear.modal import order_modes, simulate
-from microrad.lab.identify.linear.response import response_from_periods, response_from_records
+from microrad.lab.identify.linear.response import (
+    measure_frequency_response,
+    response_from_periods,
+    response_from_records,
+)
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
 
@@ -271,3 +275,24 @@ def test_the_response_of_a_state_space_is_the_same():
     freq = np.linspace(10, 4000, 20)
     discrete = lti.frequency_response(lti.StateSpace(Ad, Bd, system.C, system.D), freq, 1 / RATE_HZ)
     np.testing.assert_allclose(model.response(freq, "zero-order", RATE_HZ), discrete, rtol=1e-10)
+
+
+def test_a_band_of_periodic_records_leaves_each_drive_its_size():
+    """Two drives, two excited lines: what belongs to the drives is no longer than what belongs to the lines."""
+    drives = [(multisine(2 * k, [20, 50]), 3.0 * multisine(2 * k + 1, [20, 50])) for k in range(3)]
+    records = periodic(mirror(2), drives, noise=0.01)
+    whole = measure_frequency_response(records)
+    found = measure_frequency_response(records, band_hz=(900.0, 1100.0))
+    np.testing.assert_array_equal(found.freq_hz, whole.freq_hz[1:])
+    np.testing.assert_array_equal(found.response, whole.response[1:])
+    np.testing.assert_allclose(found.drive_rms, [1.0, 3.0])
+
+
+@pytest.mark.parametrize(("samples", "last"), [(15, 7), (16, 7)])
+def test_the_last_line_of_a_period_of_odd_length_is_no_half_of_the_rate(samples, last):
+    pulse = np.zeros(samples)
+    pulse[0] = 1.0
+    drive = np.tile(pulse, 4)
+    found = response_from_periods([recording(drive, 2.0 * np.roll(drive, 1), samples)])
+    np.testing.assert_allclose(found.freq_hz, np.arange(1, last + 1) * RATE_HZ / samples)
+    np.testing.assert_allclose(found.response[:, 0, 0], 2.0 * np.exp(-2j * np.pi * found.freq_hz / RATE_HZ))

@@ -31,7 +31,7 @@ from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, pole
 from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
-from microrad.lab.identify.statistics import propagated
+from microrad.lab.identify.statistics import correlation, propagated
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mirror
@@ -947,3 +947,8 @@ def test_a_tie_goes_to_the_admissible_model_however_many_parameters_it_has():
     noise = philox(2).standard_normal(1000)
     assert choose_best([wrong_way, plays], [[noise], [noise]]) == 1
     assert choose_best([plays, wrong_way], [[noise], [noise]]) == 0
+
+
+def test_what_does_not_vary_is_correlated_with_nothing():
+    assert_array_equal(correlation(np.diag([4.0, 0.0])), np.diag([1.0, 0.0]))
+    assert_allclose(correlation(np.array([[4e-24, -1e-18], [-1e-18, 1e-12]])), [[1.0, -0.5], [-0.5, 1.0]])

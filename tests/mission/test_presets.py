@@ -283,3 +283,12 @@ def test_a_table_can_be_unknown(tmp_path, table):
     with pytest.raises(MissionError) as caught:
         load_link(as_file(tmp_path, "paper", "\n".join(lines)))
     assert [(fault.key, fault.reason) for fault in caught.value.faults] == [(table, NOT_PUBLISHED)]
+
+
+@pytest.mark.parametrize(
+    ("value", "example"),
+    [(-1, "5 W"), (0, "5 W"), (2, "2 W"), (0.25, "0.25 W"), (30.0, "5 W"), ("-3", "5 W"), ("4 m", "5 W")],
+)
+def test_an_example_without_its_unit_is_the_number_where_that_is_allowed(value, example):
+    with pytest.raises(UnitError, match=f'for example "{re.escape(example)}"$'):
+        Quantity("W", above=0.0, most=20.0).read(value)

@@ -178,6 +178,7 @@ def test_a_session_of_45_minutes_is_the_median_of_whole_contacts(median_s, agree
         (60.0, 61.0, "partly", "half within 1 min, 99 % within 1 min"),
         (1.25, math.inf, "partly", "half within 1.2 s, 99 % within never"),
         (61.0, 150.0, "no", "half within 1 min, 99 % within 2.5 min"),
+        (61.0, 7260.0, "no", "half within 1 min, 99 % within 120 min"),
     ],
 )
 def test_almost_real_time_is_a_minute_by_the_median_and_by_99_percent(median_s, slow_s, agrees, ours):
@@ -362,3 +363,5 @@ def test_the_points_where_claims_hold_together_are_told_by_composition_and_gains
     claim = verdict._together_claim(some)
     assert claim.agrees == "no"
     assert claim.why == f"cascade: Kp 1 V/mrad, Ki 8000 V/(mrad s). Nowhere together with these: {names[0]}"
+    none = SimpleNamespace(points=[0] * 7, together=lambda: (names[2:], ()))
+    assert verdict._together_claim(none).why == f"Nowhere together with these: {names[0]}; {names[1]}"

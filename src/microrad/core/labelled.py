@@ -67,5 +67,7 @@ def variables(dims: str, of: Sequence[Any] = (), /, **columns: tuple[str, str, A
         pick = attrgetter(what) if isinstance(what, str) else what
         values = [pick(each) for each in of] if callable(pick) else pick
         array = np.array(values, dtype=object) if units == TEXT else np.asarray(values)
+        if array.dtype == object and units != TEXT:  # None is nan
+            array = array.astype(float)
         found[name] = Variable(tuple(dims.split()), array, "1" if units == TEXT else units, meaning)
     return found

@@ -66,10 +66,18 @@ class Quantity:
         """SI value of what a file holds, a text of number and unit or a plain number; raises `UnitError`."""
         if value == UNKNOWN:
             raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
-        number = parse_quantity(value, self.unit, self.typical) if self.unit else _plain_number(value)
+        number = self._parsed(value) if self.unit else _plain_number(value)
         if fault := self.out_of_bounds(number):
             raise UnitError(value, fault, self.wanted, self.example)
         return number
+
+    def _parsed(self, value: object) -> float:
+        try:
+            return parse_quantity(value, self.unit, self.typical)
+        except UnitError as refused:
+            if not self.out_of_bounds(parse_quantity(refused.example, self.unit)):
+                raise
+            raise UnitError(value, refused.reason, refused.expected, self.example) from None
 
     @property
     def example(self) -> str:

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from microrad import link
+from microrad.core.units import format_quantity
 from microrad.link import pointing
 from microrad.link.error_budget.assembly import Judged, PointingErrorBudget
 from microrad.link.pointing.outage import Performance
@@ -225,7 +226,9 @@ def _day_claims(day: day_study.DayStudy) -> list[Claim]:
 
 
 def _minutes(time_s: float) -> str:
-    return "never" if np.isinf(time_s) else f"{time_s / 60.0:.2g} min" if time_s >= 60.0 else f"{time_s:.2g} s"
+    if np.isinf(time_s):
+        return "never"
+    return format_quantity(time_s / 60.0, "min", 2) if time_s >= 60.0 else f"{time_s:.2g} s"
 
 
 def _link_claims() -> tuple[Claim, ...]:
@@ -361,7 +364,7 @@ def _together_claim(scan: paper.Scan) -> Claim:
     held = f"{len(names)} of {len(paper.CLAIMS)} claims"
     ours = f"{held} hold together at {len(points)} of {len(scan.points)} scanned points"
     regions = "; ".join(filter(None, (_region(c, points) for c in paper.COMPOSITIONS)))
-    why = regions + ("" if not missing else f". Nowhere together with these: {'; '.join(missing)}")
+    why = ". ".join(filter(None, (regions, f"Nowhere together with these: {'; '.join(missing)}" if missing else "")))
     return Claim("section 3.1, Fig. 6 and 8", "all closed-loop claims at once", ours, "no" if missing else "yes", why)
 
 

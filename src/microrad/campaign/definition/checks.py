@@ -9,7 +9,7 @@ from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
 from microrad.campaign.records import Limit
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input, format_quantity
 from microrad.link.fade_series import FadeSeriesError
 from microrad.link.fade_series import of_mission as fading_series
 from microrad.loop import controller_study, coupled_study
@@ -191,7 +191,7 @@ def unchecked(
             continue
         word, bound = ("least", limit.least) if limit.most is None else ("most", limit.most)
         assert bound is not None  # each has one of the two
-        asked = format_quantity(bound, OUTPUTS[limit.output].unit)
+        asked = format_input(bound, OUTPUTS[limit.output].unit)
         yield (
             f"[limits] leaves out {limit.output}, so that {limit.source} = {asked} is not checked: a table "
             f'[limits.{limit.output}] with {word} = "{asked}" checks it'

@@ -22,7 +22,7 @@ MOST_SAMPLES = 20_000_000
 _WHOLE = 1e-6  # how far, in samples, a whole number of them may be off
 _ROUNDING = 1e-9  # how far, relatively, a limit may be passed by rounding
 _LEAST_TURN = 1e-3  # of the first period of a chirp
-_NO_VOLTS = 1e-12  # a room of less is none
+_NOTHING = 1e-12  # a room of less is none
 _DETECTION_GROUP = 4  # odd lines of which one is left out
 
 
@@ -122,7 +122,7 @@ def logarithmic_chirp(
             name, Problem("stop", "is not above start", f"a frequency above {format_quantity(start_hz, 'Hz')}")
         )
     if start_hz * duration_s < _LEAST_TURN:
-        least = format_quantity(_LEAST_TURN / start_hz, "s")
+        least = _rounded(_LEAST_TURN / start_hz, "s", up=True)
         reason = f"holds less than a thousandth of a period of {format_quantity(start_hz, 'Hz')}"
         raise DesignError(name, Problem("duration", reason, f"at least {least}, or a higher start"))
     growth = math.log(stop_hz / start_hz) / duration_s
@@ -287,7 +287,7 @@ def samples_in(limits: Limits, name: str, key: str, seconds: float) -> int:
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
     if seconds > most:
         reason = f"makes a record of {format_quantity(seconds, 's')} at {format_quantity(limits.rate_hz, 'Hz')}"
-        expected = f"at most {format_quantity(most, 's')} ({MOST_SAMPLES / 1e6:g} million samples), or a lower rate"
+        expected = f"at most {_rounded(most, 's')} ({MOST_SAMPLES / 1e6:g} million samples), or a lower rate"
         raise DesignError(name, Problem(key, reason, expected))
     return max(round(seconds * limits.rate_hz), 1)
 
@@ -300,7 +300,7 @@ def _too_fast(limits: Limits, key: str, highest_hz: float) -> list[Problem]:
         f"reaches {format_quantity(highest_hz, 'Hz')}, {limits.rate_hz / highest_hz:.3g} samples a period at "
         f"{format_quantity(limits.rate_hz, 'Hz')} where limits.samples_per_period asks for {fewest:g}"
     )
-    most, rate = format_quantity(limits.rate_hz / fewest, "Hz"), format_quantity(highest_hz * fewest, "Hz")
+    most, rate = _rounded(limits.rate_hz / fewest, "Hz"), _rounded(highest_hz * fewest, "Hz", up=True)
     return [Problem(key, reason, f"at most {most}, or a rate of at least {rate}")]
 
 
@@ -323,15 +323,17 @@ def _fitted(
             reached = base - size * part if limit.endswith("min") else base + size * part
             allowed = base - space if limit.endswith("min") else base + space
             reason = f"takes the drive to {format_quantity(reached, unit)}, {limit} is {format_quantity(allowed, unit)}"
-            found.append(Problem(key, reason, f"at most {_rounded_down(most)}"))
+            found.append(Problem(key, reason, f"at most {_rounded(most, 'V')}"))
     if found:
         raise DesignError(name, *found)
     return offset_v + size * shape
 
 
-def _rounded_down(volts: float) -> str:
-    digits = 10.0 ** (3 - math.floor(math.log10(volts))) if volts > _NO_VOLTS else 1.0
-    return format_quantity(math.floor(volts * digits * (1 + _ROUNDING)) / digits, "V")
+def _rounded(value: float, unit: str, *, up: bool = False) -> str:
+    """The last value of four digits that a limit allows, in words: below it, or above."""
+    digits = 10.0 ** (3 - math.floor(math.log10(value))) if value > _NOTHING else 1.0
+    found = math.ceil(value * digits * (1 - _ROUNDING)) if up else math.floor(value * digits * (1 + _ROUNDING))
+    return format_quantity(found / digits, unit)
 
 
 def _outside(limits: Limits, key: str, levels: Floats) -> list[Problem]:

@@ -63,8 +63,8 @@ def may_be_chance(losses: Sequence[Floats], best: Sequence[Floats]) -> bool:
 
 
 def correlation(covariance: Floats) -> Floats:
-    """Correlation matrix of a covariance."""
-    deviation = np.sqrt(np.diag(covariance)) + 1e-300
+    """Correlation matrix of a covariance: nothing for what does not vary."""
+    deviation = np.sqrt(np.diag(covariance)) + 1e-150
     return np.asarray(covariance / np.outer(deviation, deviation))
 
 

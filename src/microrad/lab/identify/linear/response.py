@@ -142,7 +142,7 @@ def measure_frequency_response(
     parts: dict[str, Any] = {
         field.name: value[kept]
         for field in fields(found)
-        if isinstance(value := getattr(found, field.name), np.ndarray) and len(value) == kept.size
+        if isinstance(value := getattr(found, field.name), np.ndarray) and field.name != "drive_rms"
     }
     return replace(found, **parts)
 
@@ -392,7 +392,7 @@ def response_from_periods(records: Sequence[Recording], *, skip_periods: int = 0
             f"{m} records of one usable period for {inputs} inputs leave nothing to estimate the confidence from; "
             "give more realisations or more periods."
         )
-    lines = _excited_lines(drive)
+    lines = _excited_lines(drive, period)
     u, y = drive[:, :, lines].mean(axis=1), output[:, :, lines].mean(axis=1)
     freq = lines * records[0].rate_hz / period
     auto = np.einsum("mfi,mfj->fij", u, u.conj())
@@ -443,11 +443,12 @@ def _periods(records: Sequence[Recording], name: str, period: int, skip: int) ->
     return np.asarray(np.fft.rfft(np.stack(parts), axis=2) * (np.sqrt(2.0) / period))
 
 
-def _excited_lines(drive: Complexes) -> Integers:
+def _excited_lines(drive: Complexes, period: int) -> Integers:
     """Lines, without zero and half the rate, whose drive power is above a thousandth of the strongest line's."""
     power = np.mean(np.abs(drive) ** 2, axis=(0, 1)).max(axis=1)
     power[0] = 0.0
-    power[-1] = 0.0
+    if period % 2 == 0:
+        power[-1] = 0.0
     if not power.any():
         raise IdentificationError("no drive changes in any record, so there is no response; excite the mirror.")
     return np.flatnonzero(power > _EXCITED * power.max())
