@@ -334,3 +334,120 @@ def test_a_travel_without_meaning_is_refused(changes, message):
 def test_a_half_range_without_meaning_is_refused(pair):
     with pytest.raises(ValueError, match=r"^stroke budget: bias_rad is .*; give two half ranges \(x, y\) in rad"):
         demand(bias=pair)
+
+
+def test_a_budget_of_numbers_that_are_all_unlike_has_each_in_its_place():
+    """An oblique turned mirror with coupling and a telescope: what each output has to do, from its rows by hand."""
+    wanted = StrokeDemand((3e-3, 1e-3), (7e-5, 2e-5), (4e-4, 5e-4), (6e-6, 8e-6), point_ahead_on_mirror=False)
+    seen = Geometry("optical", math.radians(40.0), 6.0, 0.3, ((1.0, 0.05), (-0.02, 0.9)))
+    x, y = stroke_budget(
+        seen,
+        wanted,
+        travel_rad=0.05,
+        travel_angle="mechanical",
+        usable_travel_rad=0.03,
+        sources={"bias_rad": "alignment", "rate_lag_rad": "orbit"},
+    )
+    turn = np.array([[math.cos(0.3), -math.sin(0.3)], [math.sin(0.3), math.cos(0.3)]])
+    chain = turn @ np.diag([2.0, 2.0 * math.cos(math.radians(40.0))]) @ [[1.0, 0.05], [-0.02, 0.9]] / 6.0
+    for budget, row, along in (
+        (x, np.linalg.inv(chain)[0], "0.974, 0.226"),
+        (y, np.linalg.inv(chain)[1], "0.281, 0.96"),
+    ):
+        size = math.hypot(*row)
+        values = [(abs(row[0]) * a + abs(row[1]) * b) / size for a, b in ((3e-3, 1e-3), (4e-4, 5e-4), (6e-6, 8e-6))]
+        assert [line.value for line in budget.lines] == pytest.approx([values[0], 0.0, *values[1:]], rel=1e-12)
+        assert [line.source for line in budget.lines] == ["not stated", "not stated", "alignment", "orbit"]
+        assert [line.basis for line in budget.lines] == [
+            f"half range at the line of sight: x 3 mrad, y 1 mrad; along ({along})",
+            "half range at the line of sight: x 70 µrad, y 20 µrad; made by another mirror",
+            f"half range at the line of sight: x 400 µrad, y 500 µrad; along ({along})",
+            f"half range at the line of sight: x 6 µrad, y 8 µrad; along ({along})",
+        ]
+        assert (budget.travel_angle, budget.travel_rad, budget.usable_travel_rad) == ("mechanical", 0.05, 0.03)
+        assert budget.magnification == 6.0
+        assert budget.mirror_per_line_of_sight == pytest.approx(size, rel=1e-12)
+        assert budget.needed_rss_rad == pytest.approx(size * math.hypot(*values), rel=1e-12)
+        assert budget.margin_rss_rad == pytest.approx(0.015 - size * math.hypot(*values), rel=1e-12)
+        assert budget.largest_magnification_rss == pytest.approx(6.0 * 0.015 / (size * math.hypot(*values)), rel=1e-12)
+    assert [x.needed_rad, y.needed_rad] == pytest.approx([0.0109919010, 0.0104497693], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"coupling": ((1.0, 2.0), (1.0, 2.0001)), "rotation_rad": 0.2, "magnification": 3.0},
+            "the two-axis mirror is singular: at 146.5 degrees from x towards y it moves the line of sight 1e+05 times "
+            "less than across that direction (at most 10000 can be decoupled); check coupling and incidence_rad",
+        ),
+        (
+            {"incidence_rad": 1.57079, "rotation_rad": 2.5},
+            "the two-axis mirror is singular: at 53.2 degrees from x towards y it moves the line of sight 1.58e+05 "
+            "times less than across that direction (at most 10000 can be decoupled); check coupling and incidence_rad",
+        ),
+        (
+            {"layout": "tripod", "actuator_radius_m": 0.03, "coupling": ((2.0, 0.0), (1.0, 1e-5))},
+            "the tripod mirror is singular: at 116.6 degrees from x towards y it moves the line of sight 2.5e+05 times "
+            "less than across that direction (at most 10000 can be decoupled); check coupling and incidence_rad",
+        ),
+    ],
+    ids=["turned", "grazing", "tripod"],
+)
+def test_the_weak_direction_of_a_turned_mirror_is_that_of_the_line_of_sight(changes, words):
+    with pytest.raises(ValueError) as refused:
+        geometry.outputs_matrix(Geometry("mechanical", **changes))
+    assert str(refused.value) == f"geometry: {words}"
+
+
+@pytest.mark.parametrize("key", ["body_pointing_rad", "point_ahead_rad", "bias_rad", "rate_lag_rad"])
+@pytest.mark.parametrize("pair", [(2e-6, -1e-9), (math.inf, 0.0), (1e-6, 2e-6, 3e-6)])
+def test_each_half_range_is_checked_on_both_axes_under_its_own_name(key, pair):
+    ranges = dict.fromkeys(("body_pointing_rad", "point_ahead_rad", "bias_rad", "rate_lag_rad"), (1e-6, 2e-6))
+    with pytest.raises(ValueError) as refused:
+        StrokeDemand(**ranges | {key: pair}, point_ahead_on_mirror=True)
+    assert str(refused.value) == (
+        f"stroke budget: {key} is {pair}; give two half ranges (x, y) in rad, each finite and at least 0"
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"coupling": ((1, 0, 0), (0, 1, 0))},
+            "coupling is ((1, 0, 0), (0, 1, 0)); give two rows of two finite numbers, ((1, 0), (0, 1)) for none",
+        ),
+        (
+            {"coupling": ((1, -math.inf), (0, 1)), "actuator_radius_m": 0.5},
+            "coupling is ((1, -inf), (0, 1)); give two rows of two finite numbers, ((1, 0), (0, 1)) for none",
+        ),
+        (
+            {"layout": "tripod", "actuator_radius_m": math.nan},
+            "actuator_radius_m is nan; give the radius of the circle on which the tripod's three actuators stand, in m "
+            "and above 0",
+        ),
+    ],
+)
+def test_a_geometry_is_refused_in_all_words(values, message):
+    with pytest.raises(ValueError) as refused:
+        Geometry(**({"angle": "mechanical"} | values))
+    assert str(refused.value) == f"geometry: {message}"
+
+
+def test_a_turned_tripod_behind_a_telescope_is_seen_through_all_of_its_parts():
+    """The first actuator alone by 1: a tilt of -2/3 in x, seen twice, in both axes by coupling, then turned."""
+    tripod = Geometry("mechanical", 0.7, 5.0, -0.4, ((0.9, 0.2), (0.1, 1.1)), "tripod", 0.04)
+    x, y = 2.0 * -0.6, 2.0 * math.cos(0.7) * -2.0 / 30.0
+    expected = [(math.cos(0.4) * x + math.sin(0.4) * y) / 5.0, (-math.sin(0.4) * x + math.cos(0.4) * y) / 5.0]
+    np.testing.assert_allclose(geometry.line_of_sight_matrix(tripod) @ [1.0, 0.0, 0.0], expected, rtol=1e-12)
+    second = np.array([-0.9 * -0.5 - 0.2 * math.sqrt(0.75), -0.1 * -0.5 - 1.1 * math.sqrt(0.75)]) * 2.0 / 3.0
+    turned = np.array([[math.cos(0.4), math.sin(0.4)], [-math.sin(0.4), math.cos(0.4)]])
+    seen = turned @ (second * [2.0, 2.0 * math.cos(0.7)]) / 5.0
+    np.testing.assert_allclose(geometry.line_of_sight_matrix(tripod) @ [0.0, 1.0, 0.0], seen, rtol=1e-12)
+
+
+def test_an_item_that_is_not_of_the_choices_is_named_with_where_it_stands():
+    with pytest.raises(ValueError) as refused:
+        Geometry("optical", layout="three-axis")
+    assert str(refused.value) == 'geometry: layout is \'three-axis\'; choose "two-axis" or "tripod"'
