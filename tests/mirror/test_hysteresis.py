@@ -454,3 +454,159 @@ def test_the_inverse_of_a_mirror_carries_creep_and_widening_by_actuator():
     assert loop.inverse_lag_actuator.tolist() == [0, 0, 0, 2]
     assert_allclose(loop.inverse_lag_keep, [exp(-PERIOD / tau) for tau in (0.02, 0.1, 0.5, 1.0)], rtol=1e-14)
     assert simulate.at_rest(loop).inverse_clamped.size == 1 + 3
+
+
+# ------------------------------------------------------------------------------------- models of numbers all unlike
+UNLIKE = BoucWen(7e-5, -2e-7, -1.3e-5, 3e-4, 2.5, -0.7, 900.0, 4.0, 0.3, -0.2, 1.6)
+OPERATOR = PrandtlIshlinskii((0.0, 0.5, 2.0), (4e-5, 1e-5, -3e-6), 2e-4, 800.0, (1e-6, -2e-6, 3e-6), 5.0)
+
+
+@pytest.mark.parametrize(
+    ("rising", "sign", "decay"), [(1.0, 1.0, 1.9), (1.0, -1.0, 2.7), (-1.0, 1.0, 3.7), (-1.0, -1.0, 1.7)]
+)
+def test_each_side_of_each_branch_decays_by_its_own_sum(rising, sign, decay):
+    assert UNLIKE.decay_1_v(rising, sign) == pytest.approx(decay, rel=1e-12)
+
+
+def test_scalars_of_a_model_with_a_falling_and_a_rising_branch_that_differ():
+    """epsilon is below 0: the rising branch settles below 0 with the decay 2.7, the falling one above with 3.7."""
+    size = 1.3e-5 / 2.5
+    up, down = -size * (2.5 / 2.7) ** (1 / 1.6), size * (2.5 / 3.7) ** (1 / 1.6)
+    assert UNLIKE.settled_branch_rad(1.0) == pytest.approx(up, rel=1e-12)
+    assert UNLIKE.settled_branch_rad(-1.0) == pytest.approx(down, rel=1e-12)
+    assert UNLIKE.settled_rad == pytest.approx(-up, rel=1e-12)
+    swing = 1 + 1.7 / 2.7  # behind the rising branch; behind the falling one 1 + 1.9 / 3.7
+    assert UNLIKE.reversal_swing == pytest.approx(swing, rel=1e-12)
+    for rate_v_s, growth in ((0.0, 1.0), (-500.0, exp(0.15)), (5e3, exp(0.27))):
+        slope = 7e-5 - 1.3e-5 * growth * swing
+        assert UNLIKE.reversal_slope_rad_v(rate_v_s) == pytest.approx(slope, rel=1e-12)
+    assert UNLIKE.admissible_rate_v_s == pytest.approx(log(7e-5 / (1.3e-5 * swing)) / 3e-4, rel=1e-12)
+    assert UNLIKE.wrong_way_rad == 0.0 and UNLIKE.admissible
+    turned = hysteresis.sign_reversed(UNLIKE)
+    assert turned == replace(UNLIKE, d1_rad_v=-7e-5, epsilon_rad_v=1.3e-5, beta_1_v=0.7, gamma_1_v=-0.3)
+    assert turned.admissible_rate_v_s == pytest.approx(UNLIKE.admissible_rate_v_s, rel=1e-12)
+    assert (*UNLIKE.row[:8], *UNLIKE.row[8:10]) == (7e-5, -2e-7, -1.3e-5, 3e-4, 2.5, -0.7, 900.0, 4.0, 0.3, -0.2)
+    assert UNLIKE.row[10:] == pytest.approx((0.6, 2.5 / 1.3e-5), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("model", "slope"),
+    [
+        (UNLIKE, 7e-5 * exp(1.8e-4) + 1.3e-5 * exp(0.27) * (1 + 3.7 / 1.7)),
+        (replace(UNLIKE, delta_s_v=-3e-4), 7e-5 * exp(1.8e-4) + 1.3e-5 * (1 + 3.7 / 1.7)),
+        (replace(UNLIKE, delta_s_v=0.0, d2_s_v=0.0, rate_limit_v_s=inf), 7e-5 + 1.3e-5 * (1 + 3.7 / 1.7)),
+        (replace(UNLIKE, alpha_1_v=0.9, delta_s_v=0.0), 7e-5 * exp(1.8e-4) + 1.3e-5 * (1 + 2.1 / 0.1)),
+        (replace(UNLIKE, alpha_1_v=0.2), 7e-5 * exp(1.8e-4) + 1.3e-5 * exp(0.27) * (1 + (exp(1) - 1) * 1.4 / 0.6)),
+        (replace(UNLIKE, alpha_1_v=-0.9), 7e-5 * exp(1.8e-4) + 1.3e-5 * exp(0.27) * exp(1)),
+        (replace(OPERATOR, widening_s=0.0), 5.3e-5 + (2 * 3e-6 + 3 * 3e-6) / 5.0),
+    ],
+    ids=["rate", "slower", "no rate", "positive", "hardening", "softening", "plays"],
+)
+def test_the_steepest_slope_of_numbers_all_unlike(model, slope):
+    assert hysteresis.steepest_slope(model) == pytest.approx(slope, rel=1e-12)
+
+
+def test_gains_of_an_operator_with_a_weight_below_0():
+    assert hysteresis.slow_gain(OPERATOR) == pytest.approx(4.7e-5, rel=1e-12)
+    assert hysteresis.rest_gain(OPERATOR) == pytest.approx(4e-5, rel=1e-12)
+    assert hysteresis.rest_gain(UNLIKE) == pytest.approx(5.7e-5, rel=1e-12)
+    assert hysteresis.output_amplitude(OPERATOR, 3.0) == pytest.approx(3 * 4e-5 + 2.5 * 1e-5 - 3e-6, rel=1e-12)
+    assert hysteresis.output_amplitude(UNLIKE, 3.0) == pytest.approx(2.1e-4, rel=1e-12)
+    # amplitudes below the first threshold, between both and above: the plays end at 0.5 V with 20 and at 2 V with 95
+    for output_rad, drive_v in ((1e-5, 0.25), (6e-5, 0.5 + 40 / 50), (1e-3, 2.0 + 905 / 47)):
+        assert hysteresis.secant_gain(OPERATOR, output_rad) == pytest.approx(output_rad / drive_v, rel=1e-12)
+    assert hysteresis.secant_gain(OPERATOR, inf) == pytest.approx(4.7e-5, rel=1e-12)
+    assert hysteresis.gain_only(OPERATOR, 6e-5) == BoucWen(pytest.approx(6e-5 / 1.3), 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_model_seen_from_behind_has_each_of_its_outputs_turned():
+    scaled = hysteresis.scaled(OPERATOR, -2.0)
+    assert scaled == replace(OPERATOR, weights_rad_v=(-8e-5, -2e-5, 6e-6), polynomial_rad=(-2e-6, 4e-6, -6e-6))
+    turned = hysteresis.scaled(UNLIKE, -3.0)
+    assert turned == replace(UNLIKE, d1_rad_v=-3.0 * 7e-5, epsilon_rad_v=3.0 * 1.3e-5)
+
+
+def test_an_operator_that_widens_has_the_inverse_of_its_own_numbers():
+    found = replace(OPERATOR, reach_v=inf).inverted()
+    assert found.thresholds_v == pytest.approx((0.0, 2e-5, 2 * 4e-5 + 1.5 * 1e-5), rel=1e-12)
+    assert found.weights_rad_v == pytest.approx((1 / 4e-5, 1 / 5e-5 - 1 / 4e-5, 1 / 4.7e-5 - 1 / 5e-5), rel=1e-12)
+    assert found.widening_s == pytest.approx(4e-5 * 2e-4 / 4.7e-5, rel=1e-12)
+    assert found.rate_limit_v_s == pytest.approx(800.0 * 4.7e-5, rel=1e-12)
+    assert (found.polynomial_rad, found.reach_v) == ((0.0, 0.0, 0.0), inf)
+
+
+@pytest.mark.parametrize("model", [UNLIKE, OPERATOR], ids=["bouc-wen", "plays"])
+def test_a_loop_counts_the_samples_of_a_period_that_are_faster_than_the_limit(model):
+    loop = replace(model, rate_limit_v_s=300.0).loop(3.0, 20.0, 48)
+    wave = 3.0 * np.sin(2 * pi * np.arange(49) / 48)
+    assert loop.clamped == int(np.sum(np.abs(np.diff(wave)) * 960.0 > 300.0)) > 0
+    assert (loop.freq_hz, loop.drive_v.size, loop.output_rad.size, loop.hysteresis_rad.size) == (20.0, 48, 48, 48)
+    assert_allclose(loop.drive_v, wave[1:], atol=1e-15)
+    width = np.ptp(loop.hysteresis_rad) / np.ptp(loop.output_rad)
+    assert repr(loop) == f"<HysteresisLoop at 20 Hz: 48 samples, {100 * width:.2f}% wide>"
+    found = loop.to_xarray()
+    assert found.attrs == {"frequency_hz": 20.0, "width": loop.width, "clamped": loop.clamped}
+    for name, values in (("drive", loop.drive_v), ("output", loop.output_rad), ("hysteresis", loop.hysteresis_rad)):
+        assert_allclose(found[name].values, values, rtol=1e-12)
+        assert found[name].attrs["units"] == ("V" if name == "drive" else "rad")
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (
+            lambda: PrandtlIshlinskii((0.0, 1.0), (1e-6,)),
+            "thresholds (0.0, 1.0) V with 1 weights make no Prandtl-Ishlinskii operator: give thresholds that rise "
+            "from 0 V or above, and a weight for each",
+        ),
+        (
+            lambda: PrandtlIshlinskii((-0.5, 1.0), (1e-6, 2e-6)),
+            "thresholds (-0.5, 1.0) V with 2 weights make no Prandtl-Ishlinskii operator: give thresholds that rise "
+            "from 0 V or above, and a weight for each",
+        ),
+        (
+            lambda: PrandtlIshlinskii((0.0,), (1e-6,), -1e-3),
+            "thresholds cannot widen by -0.001 s: give 0 s, or more for a rate",
+        ),
+        (lambda: UNLIKE.loop(0.0, 3.0), "amplitude_v of a loop is 0.0 V: give a finite number above 0"),
+        (lambda: OPERATOR.loop(1.0, inf), "freq_hz of a loop is inf Hz: give a finite number above 0"),
+        (lambda: UNLIKE.loop(1.0, 2.0, 7), "a loop of 7 samples a period has no shape: give 8 or more, better 500"),
+        (
+            lambda: UNLIKE.response([1.0, inf], 1e-3),
+            "drive_v has shape (2,): give one row of finite samples, shape (samples,)",
+        ),
+        (
+            lambda: UNLIKE.inverse([[1e-6, 2e-6]], 1e-3),
+            "output_rad has shape (1, 2): give one row of finite samples, shape (samples,)",
+        ),
+        (lambda: OPERATOR.response([1.0], -0.5), "step_s is -0.5 s: give the time between two samples, above 0"),
+        (
+            lambda: replace(UNLIKE, eta_1_v=float("nan")).response([1.0], 1.0),
+            "eta_1_v of the Bouc-Wen model is nan: give finite numbers",
+        ),
+        (
+            lambda: replace(OPERATOR, polynomial_rad=(0.0, inf, 0.0)).response([1.0], 1.0),
+            "polynomial_rad of the Prandtl-Ishlinskii model is [ 0. inf  0.]: give finite numbers",
+        ),
+        (
+            lambda: replace(UNLIKE, alpha_1_v=-500.0, delta_s_v=1.0).response(np.arange(9.0), 1e-3),
+            "the model gives no number at sample 1: look for a parameter or a rate that it was not fitted to",
+        ),
+        (
+            lambda: Creep((1e-6, 2e-6), (0.1, 0.0)).response([1.0], 0.1),
+            "creep of 2 weights and the time constants (0.1, 0.0) s: give as many weights, and time constants above 0",
+        ),
+        (
+            lambda: replace(UNLIKE, d1_rad_v=0.0).inverse([1e-6], 0.1),
+            "a Bouc-Wen model with d1 = 0 has no inverse: its output does not follow the drive",
+        ),
+        (
+            lambda: hysteresis.steepest_slope(replace(UNLIKE, rate_limit_v_s=inf, delta_s_v=0.0)),
+            "a Bouc-Wen element that is fed back and depends on rate needs a finite rate limit",
+        ),
+    ],
+)
+def test_what_a_model_cannot_do_is_said_in_all_words(ask, message):
+    with pytest.raises(ValueError) as refused:
+        ask()
+    assert str(refused.value) == message
