@@ -645,3 +645,214 @@ def test_every_change_of_an_element_is_made():
     assert first.alpha_1_v == own.alpha_1_v + 0.5
     assert first.beta_1_v == own.beta_1_v - 0.25
     assert found.mirror.bank[1:] == mirror.mirror.bank[1:]
+
+
+def handmade():
+    """Two drives, three elements and numbers all unlike, round enough to be written by hand."""
+    A = lti.modal_matrix([(-20.0, 300.0), (-7.0, 0.0)])
+    mirror = Mirror(
+        name="by hand",
+        A=A,
+        B=np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.5]]),
+        E=np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]),
+        F=np.zeros((3, 3)),
+        G=np.array([[1.1, 1.2], [1.3, 1.4], [1.5, 1.6]]),
+        C=np.array([[7.0, 8.0, 9.0]]),
+        D=np.array([[0.01, 0.02]]),
+        K=np.array([[2.1, 2.2, 2.3]]),
+        bouc_wen=(BoucWen(0.5, -1e-3, -0.25, 2e-3, 1.5, 0.75, 400.0, 3.0, 0.125, -0.375, 2.5),),
+        plays=(
+            PrandtlIshlinskii((0.0, 1.5), (0.6, -0.2), 5e-4, 700.0),
+            PrandtlIshlinskii((0.5, 2.0, 4.0), (0.3, 0.1, 0.05), polynomial_rad=(0.7, -0.8, 0.9), reach_v=6.0),
+        ),
+        inverse=(),
+    )
+    actuators = (Actuator("left", 10.0, -2.0, 30.0, 4e3), Actuator("right", 11.0, -3.0, 31.0, 5e3))
+    return CoupledMirror(mirror, actuators, (Output("gap", "displacement"),), 2e-4, 8e3, 3, (0.5, 900.0))
+
+
+def test_a_mirror_of_numbers_all_unlike_is_written_line_by_line():
+    factor = np.array([[0.6, 0.8], [-0.8, 0.6], [1.0, 0.0], [0.0, -1.0], [0.28, 0.96], [0.96, 0.28], [-0.6, 0.8]])
+    names = (
+        *("recording.delay", "modes.decay.2", "modes.frequency.1", "matrices.K.1.3"),
+        *("hysteresis.1.epsilon", "hysteresis.2.weights.2", "hysteresis.3.polynomial.3"),
+    )
+    known = Known(names, np.array([1e-5, 0.5, 2.0, 0.25, 0.125, 0.0625, 0.03]), factor)
+    written = coupled.text(replace(handmade(), known=known), ["made\tby", "hand"])
+    assert written == (
+        "# made by\n# hand\n"
+        "# Matrices, weights and standard errors are plain numbers in SI units, drives and hysteresis in V.\n"
+        'version = 2\nname = "by hand"\n\n'
+        '[actuators.1]\nname = "left"\nbias = "10.0 V"\ndrive_min = "-2.0 V"\ndrive_max = "30.0 V"\n'
+        'rate_limit = "4000.0 V/s"\n\n'
+        '[actuators.2]\nname = "right"\nbias = "11.0 V"\ndrive_min = "-3.0 V"\ndrive_max = "31.0 V"\n'
+        'rate_limit = "5000.0 V/s"\n\n'
+        '[outputs.1]\nname = "gap"\nquantity = "displacement"\n\n'
+        '[recording]\ndelay = "0.0002 s"\nrate = "8000.0 Hz"\nsteps_per_sample = 3\nexcited_from = "0.5 Hz"\n'
+        'excited_to = "900.0 Hz"\n\n'
+        '[modes]\ndecay = [\n  "20.0 1/s",\n  "7.0 1/s",\n]\nfrequency = [\n'
+        '  "300.0 rad/s",                     # mode 1: 47.8525 Hz, damping 0.06652\n'
+        '  "0.0 rad/s",                       # mode 2: 1.11408 Hz, real\n]\n\n'
+        "[matrices]\nB = [\n  [1.0, 2.0],\n  [3.0, 4.0],\n  [5.0, 6.5],\n]\nC = [\n  [7.0, 8.0, 9.0],\n]\n"
+        "D = [\n  [0.01, 0.02],\n]\n"
+        "E = [\n  [0.1, 0.2, 0.3],\n  [0.4, 0.5, 0.6],\n  [0.7, 0.8, 0.9],\n]\n"
+        "G = [\n  [1.1, 1.2],\n  [1.3, 1.4],\n  [1.5, 1.6],\n]\nK = [\n  [2.1, 2.2, 2.3],\n]\n\n"
+        '[hysteresis.1]\nmodel = "bouc-wen"\nd1 = 0.5\nepsilon = -0.25\nalpha = "1.5 1/V"\nbeta = "0.75 1/V"\n'
+        'd2 = "-0.001 s/V"\ndelta = "0.002 s/V"\ngamma = "0.125 1/V"\neta = "-0.375 1/V"\nbias = "3.0 V"\n'
+        'exponent = 2.5\nrate_limit = "400.0 V/s"\n\n'
+        '[hysteresis.2]\nmodel = "plays"\nthresholds = ["0.0 V", "1.5 V"]\nweights = [0.6, -0.2]\n'
+        'widening = "0.0005 s"\nrate_limit = "700.0 V/s"\n\n'
+        '[hysteresis.3]\nmodel = "plays"\nthresholds = ["0.5 V", "2.0 V", "4.0 V"]\nweights = [0.3, 0.1, 0.05]\n'
+        'polynomial = [0.7, -0.8, 0.9]\nreach = "6.0 V"\n\n'
+        "[uncertainty]\nparameters = [\n"
+        '  "recording.delay", "modes.decay.2", "modes.frequency.1", "matrices.K.1.3", "hysteresis.1.epsilon", '
+        '"hysteresis.2.weights.2",\n  "hysteresis.3.polynomial.3",\n]\n'
+        "standard_errors = [\n  1e-05, 0.5, 2.0, 0.25, 0.125, 0.0625,\n  0.03,\n]\n"
+        "factor = [\n  [0.6, 0.8],\n  [-0.8, 0.6],\n  [1.0, 0.0],\n  [0.0, -1.0],\n  [0.28, 0.96],\n"
+        "  [0.96, 0.28],\n  [-0.6, 0.8],\n]\n"
+    )
+
+
+def test_what_is_known_of_elements_in_another_order_is_known_of_the_same_elements():
+    """The file has plays, Bouc-Wen, plays: its columns of E and K, its rows of F and G and its elements are moved."""
+    names = (
+        *("hysteresis.1.weights.2", "hysteresis.2.alpha", "hysteresis.3.weights.1", "matrices.E.3.1"),
+        *("matrices.K.1.2", "matrices.G.2.1", "matrices.B.2.1", "matrices.C.1.2", "modes.decay.2"),
+    )
+    factor = np.eye(9)
+    data = tomllib.loads(coupled.text(handmade()))
+    one, two, three = (data["hysteresis"][key] for key in "123")
+    data["hysteresis"] = {"1": two, "2": one, "3": three}
+    errors = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09]
+    data["uncertainty"] = {"parameters": list(names), "standard_errors": errors, "factor": factor.tolist()}
+    found = coupled.of(Table.model_validate(data))
+    np.testing.assert_array_equal(found.mirror.E, handmade().mirror.E[:, [1, 0, 2]])
+    np.testing.assert_array_equal(found.mirror.G, handmade().mirror.G[[1, 0, 2]])
+    assert found.known.parameters == (
+        *("hysteresis.2.weights.2", "hysteresis.1.alpha", "hysteresis.3.weights.1", "matrices.E.3.2"),
+        *("matrices.K.1.1", "matrices.G.1.1", "matrices.B.2.1", "matrices.C.1.2", "modes.decay.2"),
+    )
+    assert found.known.standard_errors.tolist() == errors
+
+
+def test_a_correlation_in_place_of_its_factor_has_rows_of_length_one():
+    data = tomllib.loads(coupled.text(handmade()))
+    names = ["hysteresis.2.weights.1", "matrices.D.1.2", "modes.frequency.1"]
+    data["uncertainty"] = {
+        "parameters": names,
+        "standard_errors": [0.1, 0.002, 3.0],
+        "correlation": [0.5, -0.25, 0.125],
+    }
+    known = coupled.of(Table.model_validate(data)).known
+    assert known.parameters == tuple(names)
+    expected = [[1.0, 0.5, -0.25], [0.5, 1.0, 0.125], [-0.25, 0.125, 1.0]]
+    np.testing.assert_allclose(known.correlation, expected, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(known.factor, axis=1), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "field", "value"),
+    [
+        ("d1", "d1_rad_v", 0.5625),
+        ("d2", "d2_s_v", 0.0615),
+        ("epsilon", "epsilon_rad_v", -0.1875),
+        ("delta", "delta_s_v", 0.0645),
+        ("alpha", "alpha_1_v", 1.5625),
+        ("beta", "beta_1_v", 0.8125),
+        ("gamma", "gamma_1_v", 0.1875),
+        ("eta", "eta_1_v", -0.3125),
+        ("exponent", "exponent", 2.5625),
+    ],
+)
+def test_each_number_of_an_element_is_changed_and_no_other(key, field, value):
+    found = changed(handmade(), {f"hysteresis.1.{key}": 0.0625})
+    assert getattr(found.mirror.bouc_wen[0], field) == pytest.approx(value, rel=1e-12)
+    assert (
+        replace(found.mirror.bouc_wen[0], **{field: getattr(handmade().mirror.bouc_wen[0], field)})
+        == (handmade().mirror.bouc_wen[0])
+    )
+    assert found.mirror.plays == handmade().mirror.plays
+
+
+def test_changes_of_one_part_add_up_and_leave_the_others():
+    """Two entries of one matrix, two numbers of one element, one of another, and both numbers of a mode."""
+    by = {
+        "matrices.C.1.1": 0.5,
+        "matrices.C.1.3": -0.25,
+        "matrices.G.3.2": 2.0,
+        "hysteresis.3.thresholds.1": 0.125,
+        "hysteresis.3.weights.3": -1.0,
+        "hysteresis.3.polynomial.1": -2.0,
+        "hysteresis.2.weights.2": -0.5,
+        "hysteresis.2.widening": 1e-4,
+        "modes.decay.1": 3.0,
+        "modes.frequency.1": 5.0,
+        "recording.delay": -5e-5,
+    }
+    found = changed(handmade(), by)
+    own = handmade().mirror
+    assert coupled.modes(found.mirror.A) == ((-23.0, 305.0), (-7.0, 0.0))
+    np.testing.assert_array_equal(found.mirror.C, [[7.5, 8.0, 8.75]])
+    np.testing.assert_array_equal(found.mirror.G, [[1.1, 1.2], [1.3, 1.4], [1.5, 3.6]])
+    assert found.mirror.bouc_wen == own.bouc_wen
+    assert found.mirror.plays[0] == replace(own.plays[0], weights_rad_v=(0.6, -0.7), widening_s=5e-4 + 1e-4)
+    third = found.mirror.plays[1]
+    assert third == replace(
+        own.plays[1],
+        thresholds_v=(0.625, 2.0, 4.0),
+        weights_rad_v=(0.3, 0.1, 0.0),
+        polynomial_rad=(0.7 - 2.0, -0.8, 0.9),
+    )
+    assert found.delay_s == pytest.approx(1.5e-4, rel=1e-12)
+
+
+def test_what_does_not_fit_a_mirror_is_said_in_all_words():
+    mirror = handmade()
+    said = []
+    for ask in (
+        lambda: replace(mirror, actuators=mirror.actuators[:1]),
+        lambda: replace(mirror, outputs=()),
+        lambda: mirror.response(np.zeros((5, 3))),
+        lambda: moved(mirror, np.zeros(2)),
+    ):
+        with pytest.raises(ValueError) as refused:
+            ask()
+        said.append(str(refused.value))
+    assert said == [
+        "1 actuators are named, and the mirror has 2; name each, in their order",
+        "0 outputs are named, and the mirror has 1; name each, in their order",
+        "the drive has the shape (5, 3); give samples x 2, a column for each actuator of 'by hand'",
+        'the mirror "by hand" has no table uncertainty, so nothing can be drawn; `microrad identify` writes one into '
+        "its mirror file",
+    ]
+    assert mirror.step_s == pytest.approx(1 / 24e3, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "words"),
+    [
+        (
+            [("displacement", (0.0, 1.0)), ("displacement", None), ("displacement", (1.0, 0.0)), ("angle", None)],
+            "2 of 3 displacements have a position; two tilts and a piston take at least three, and the position of "
+            "each",
+        ),
+        (
+            [("displacement", (0.0, 0.0)), ("angle", None), ("displacement", (1.0, 2.0)), ("displacement", (-2, -4))],
+            "all displacements lie on one line, and a tilt about that line moves none; add one beside it",
+        ),
+    ],
+)
+def test_positions_without_a_plane_are_refused_in_all_words(outputs, words):
+    with pytest.raises(ValueError) as refused:
+        coupled.tilts_and_piston([Output(f"y {i}", *each) for i, each in enumerate(outputs)])
+    assert str(refused.value) == words
+
+
+def test_an_angle_between_displacements_keeps_its_column_of_zeros():
+    places = ((0.0, 2.0), None, (3.0, -1.0), (-1.0, -2.0))
+    outputs = [Output(f"y {i}", "displacement" if p else "angle", p) for i, p in enumerate(places)]
+    matrix = coupled.tilts_and_piston(outputs)
+    plane = [0.3, -0.7, 5.0]  # tilts about x and y, piston
+    seen = [plane[2] + y * plane[0] - x * plane[1] for x, y in (place or (9.0, 9.0) for place in places)]
+    np.testing.assert_allclose(matrix @ seen, plane, rtol=1e-12)
+    assert not matrix[:, 1].any()
