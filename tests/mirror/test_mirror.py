@@ -826,3 +826,189 @@ def test_a_linear_system_without_decay_is_refused(real):
         Mirror.of_system(system, "mine")
     through = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[3e-5]]))
     assert_allclose(Mirror.of_system(through).response([2.0], 1.0), [6e-5])
+
+
+# ------------------------------------------------------------------------------------ matrices of numbers all unlike
+LAGGING = lti.StateSpace(
+    np.array([[-5.0, 40.0], [-40.0, -5.0]]), np.array([[2.0], [-3.0]]), np.array([[7.0, 11.0]]), np.zeros((1, 1))
+)
+SLOW = Creep((1e-6, -2e-6), (0.5, 4.0))
+
+
+@pytest.mark.parametrize(
+    ("composition", "E", "K"),
+    [
+        ("cascade", [[2.0], [-3.0], [0.0], [0.0]], [[0.0]]),
+        ("additive", [[2.0, 0.0], [-3.0, 0.0], [0.0, 0.0], [0.0, 0.0]], [[0.0, 1.0]]),
+    ],
+)
+@pytest.mark.parametrize("model", [PRINTED, PLAYS], ids=["bouc-wen", "plays"])
+def test_each_composition_has_its_matrices_with_creep_behind_them(composition, E, K, model):
+    m = mirror.assemble("m", composition, LAGGING, model, SLOW)
+    assert m.A.tolist() == [[-5.0, 40.0, 0, 0], [-40.0, -5.0, 0, 0], [0, 0, -2.0, 0], [0, 0, 0, -0.25]]
+    assert m.B.tolist() == [[0.0], [0.0], [2.0], [0.25]]
+    assert m.C.tolist() == [[7.0, 11.0, 1e-6, -2e-6]]
+    assert (m.E.tolist(), m.K.tolist(), m.D.tolist()) == (E, K, [[0.0]])
+    assert m.F.tolist() == [[0.0] * 4] * len(K[0]) and m.G.tolist() == [[1.0]] * len(K[0])
+    assert (m.name, m.inverse, m.inverse_creep) == ("m", (model,), (SLOW,))
+    parts = {
+        ("cascade", PRINTED): (PRINTED,),
+        ("cascade", PLAYS): (PLAYS,),
+        ("additive", PRINTED): (replace(PRINTED, epsilon_rad_v=0.0), replace(PRINTED, d1_rad_v=0.0)),
+        ("additive", PLAYS): (
+            PrandtlIshlinskii((0.0,), (0.06e-3,)),
+            PrandtlIshlinskii((0.4, 1.5), (0.02e-3, 0.009e-3)),
+        ),
+    }
+    assert m.bank == parts[composition, model]
+
+
+def test_plays_that_begin_above_0_have_no_gain_to_split_off():
+    late = PrandtlIshlinskii((0.2, 0.5), (3e-5, 1e-5))
+    m = mirror.assemble("late", "additive", LAGGING, late, SLOW)
+    assert m.bank == (late,)
+    assert (m.E.tolist(), m.K.tolist()) == ([[2.0], [-3.0], [0.0], [0.0]], [[0.0]])
+    static = mirror.assemble("late", "static", LAGGING, late, SLOW)
+    assert (static.A.tolist(), static.C.tolist()) == ([[-2.0, 0.0], [0.0, -0.25]], [[1e-6, -2e-6]])
+    assert (static.E.tolist(), static.K.tolist()) == ([[0.0], [0.0]], [[1.0]])
+
+
+def unlike():
+    """Two drives, two outputs, three elements that are fed back and straight ways through."""
+    return Mirror(
+        name="unlike",
+        A=np.array([[-2.0, 0.0], [0.0, -3.0]]),
+        B=np.array([[1.0, 2.0], [3.0, 5.0]]),
+        E=np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.7]]),
+        F=np.array([[0.01, 0.02], [0.03, 0.05], [0.07, 0.11]]),
+        G=np.array([[1.1, 1.3], [1.7, 1.9], [2.3, 2.9]]),
+        C=np.array([[13.0, 17.0], [19.0, 23.0]]),
+        D=np.array([[29.0, 31.0], [37.0, 41.0]]),
+        K=np.array([[0.6, 0.8, 0.9], [1.2, 1.4, 1.6]]),
+        bouc_wen=(BoucWen(0.5, 0.0, -0.1, 0.0, 1.0, 0.2),),
+        plays=(PrandtlIshlinskii((0.0, 1.0), (0.3, 0.1)), PrandtlIshlinskii((0.0,), (0.7,))),
+        inverse=(),
+    )
+
+
+def test_gains_in_place_of_elements_pass_from_each_drive_and_state_to_each_state_and_output():
+    m, gains = unlike(), np.diag([0.5, 0.4, 0.7])
+    found = m.linear_loop
+    assert_allclose(found.A, m.A + m.E @ gains @ m.F, rtol=1e-12)
+    assert_allclose(found.B, m.B + m.E @ gains @ m.G, rtol=1e-12)
+    assert_allclose(found.C, m.C + m.K @ gains @ m.F, rtol=1e-12)
+    assert_allclose(found.D, m.D + m.K @ gains @ m.G, rtol=1e-12)
+    at = 2j * pi * 3.0
+    seen = found.C @ np.linalg.solve(at * np.eye(2) - found.A, found.B) + found.D
+    assert_allclose(m.frequency_response([0.7, 3.0])[1], seen, rtol=1e-12)
+    straight = mirror.linearised(m, [0.5, 0.4, 0.7])
+    for name in "ABCD":
+        assert_allclose(getattr(straight, name), getattr(found, name), rtol=1e-15)
+    assert [getattr(straight, name).shape for name in "EFGK"] == [(2, 0), (0, 2), (0, 2), (2, 0)]
+    assert (straight.name, straight.bank, straight.actuators, straight.axes) == ("unlike", (), 2, 2)
+
+
+def test_mirrors_of_other_sizes_side_by_side_keep_their_elements_in_order():
+    """Plays alone, then three elements with two drives, then one of Bouc and Wen alone."""
+    first = mirror.assemble("first", "static", None, PLAYS, SLOW)
+    last = mirror.assemble("last", "cascade", LAGGING, PRINTED)
+    both = mirror.combine(first, unlike(), last)
+    assert both.name == "first + unlike + last"
+    assert both.bank == (*unlike().bouc_wen, PRINTED, PLAYS, *unlike().plays)
+    assert both.inverse == (PLAYS, PRINTED) and both.inverse_creep == (SLOW, hysteresis.NO_CREEP)
+    assert (both.A.shape, both.B.shape, both.D.shape) == ((6, 6), (6, 4), (4, 4))
+    assert both.G.tolist() == [
+        [0.0, 1.1, 1.3, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.7, 1.9, 0.0],
+        [0.0, 2.3, 2.9, 0.0],
+    ]
+    assert both.K.tolist() == [
+        [0.0, 0.0, 1.0, 0.0, 0.0],
+        [0.6, 0.0, 0.0, 0.8, 0.9],
+        [1.2, 0.0, 0.0, 1.4, 1.6],
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+    ]
+    assert both.E[2].tolist() == [0.1, 0.0, 0.0, 0.2, 0.3] and both.E[5].tolist() == [0.0, -3.0, 0.0, 0.0, 0.0]
+    assert both.F[3].tolist() == [0.0, 0.0, 0.03, 0.05, 0.0, 0.0]
+
+
+def test_the_loop_through_one_step_counts_what_is_fed_back_alone():
+    m = unlike()
+    steepest = [hysteresis.steepest_slope(model) for model in m.bank]
+    assert steepest == pytest.approx([0.5 + 0.1 * (1 + 1.2 / 0.8), 0.4, 0.7], rel=1e-12)
+    end = lti.first_order_hold(m.A, m.E, 0.25)[2]
+    returned = [sum(abs(m.F[i] @ end[:, j]) * steepest[j] for j in range(3)) for i in range(3)]
+    assert mirror.contraction(m, 0.25) == pytest.approx(max(returned), rel=1e-12)
+    alone = replace(m, F=np.array([[0.0, 0.0], [0.03, 0.05], [0.0, 0.0]]))
+    only = abs(alone.F[1] @ end[:, 1]) * 0.4
+    assert mirror.contraction(alone, 0.25) == pytest.approx(only, rel=1e-12)
+    assert mirror.contraction(replace(m, F=np.zeros((3, 2))), 0.25) == 0.0
+
+
+def test_a_transfer_function_that_is_negative_where_it_is_normalised_keeps_its_sign(table):
+    given = with_linear(
+        table, numerator=(-3.0, -2e4), denominator=(1e-3, 4.0, 9e4), normalise_at_hz=40.0, excited_from_hz=5.0
+    ).linear
+    at = 2j * pi * 40.0
+    response = (-3.0 * at - 2e4) / (1e-3 * at**2 + 4.0 * at + 9e4)
+    system, gain = mirror.linear_part(given)
+    assert gain == pytest.approx(-abs(response), rel=1e-9)
+    found = lti.frequency_response(system, np.array([0.0, 40.0]))[:, 0, 0]
+    assert_allclose(found, [-2.0 / 9.0 / gain, response / gain], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (
+            lambda: Mirror.of(PLAYS, [1.0], [1.0, 0.0, 3.0], name="wobbly"),
+            "the linear part of mirror 'wobbly' has a numerator of 1 and a denominator of 3 coefficients: give one "
+            "that is proper and stable (every root of the denominator left of the imaginary axis) and that passes a "
+            "constant",
+        ),
+        (
+            lambda: Mirror.of(PLAYS, [1.0], [[1.0, 3.0]], name="square"),
+            "mirror 'square': numerator and denominator have to be rows of finite coefficients",
+        ),
+        (
+            lambda: Mirror.of(PLAYS, [1.0], [1e-300, 3.0], name="thin"),
+            "the denominator of mirror 'thin' begins with 1e-300, nothing beside the others",
+        ),
+        (
+            lambda: Mirror.of(PLAYS, creep=replace(SLOW, time_constants_s=(nan, 1.0))),
+            "time_constants_s of the creep model is [nan  1.]: give finite numbers",
+        ),
+        (
+            lambda: mirror.assemble("x", "additive", None, PLAYS),
+            'composition "additive" needs a linear part; give one or choose "static"',
+        ),
+        (
+            lambda: unlike().response([1.0, 2.0], 0.1),
+            "drive_v has shape (2,): mirror 'unlike' takes finite samples of shape (samples, 2)",
+        ),
+        (
+            lambda: unlike().response([[1.0, 2.0, 3.0]], 0.1),
+            "drive_v has shape (1, 3): mirror 'unlike' takes finite samples of shape (samples, 2)",
+        ),
+        (
+            lambda: unlike().response([[1.0, inf]], 0.1),
+            "drive_v has shape (1, 2): mirror 'unlike' takes finite samples of shape (samples, 2)",
+        ),
+        (lambda: unlike().response([[1.0, 2.0]], 0.0), "step_s is 0.0 s: give the time between two samples, above 0"),
+        (
+            lambda: unlike().frequency_response([[1.0, 2.0]]),
+            "freq_hz has shape (1, 2): give one row of finite frequencies",
+        ),
+        (
+            lambda: replace(unlike(), F=40.0 * unlike().F).response([[1.0, 2.0]], 2.0),
+            "mirror 'unlike': the loop through F is no contraction at a step of 2 s; use a step of at most 0.125 s, or "
+            "move the mean slope of the hysteresis into A",
+        ),
+    ],
+)
+def test_a_mirror_says_in_all_words_what_it_cannot_do(ask, message):
+    with pytest.raises(ValueError) as refused:
+        ask()
+    assert str(refused.value) == message
