@@ -21,7 +21,7 @@ from microrad.mirror import model as mirror
 from microrad.mirror import summary as mirror_summary
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
-from microrad.mission.file import load_mission
+from microrad.mission.file import load_mirror, load_mission
 from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
 from shipped import SHIPPED, edited
 
@@ -1012,3 +1012,38 @@ def test_a_mirror_says_in_all_words_what_it_cannot_do(ask, message):
     with pytest.raises(ValueError) as refused:
         ask()
     assert str(refused.value) == message
+
+
+def test_the_summary_of_a_mirror_with_faults_of_each_kind_word_by_word(tmp_path):
+    path = tmp_path / "mirror.toml"
+    path.write_text(
+        'name = "m 7"\ntravel = "3 mrad"\ncomposition = "cascade"\nrate_limit = "512.5 V/s"\nbias = "5 V"\n'
+        'drive_min = "0 V"\ndrive_max = "10 V"\n[bouc_wen]\nd1 = "80 urad/V"\nd2 = "0 s/V"\nepsilon = "-75 urad/V"\n'
+        'delta = "4e-3 s/V"\nalpha = "1.5 1/V"\nbeta = "0.4 1/V"\n'
+        '[creep]\ntime_constants = ["0.1 s", "1 s", "30 s"]\nweights = ["2 urad/V", "1 urad/V", "5 urad/V"]\n'
+        '[linear]\npoles = ["150 Hz", "900 Hz"]\npole_dampings = [0.35, 1.0]\nnormalise_at = "200 Hz"\n'
+        'excited_from = "160 Hz"\nexcited_to = "500 Hz"\n',
+        encoding="utf-8",
+    )
+    summary = mirror_summary.summarise(load_mirror(path).mirror)
+
+    def size(f):
+        return 1 / (abs(complex(1 - (f / 150) ** 2, 0.7 * f / 150)) * abs(complex(1, f / 900)))
+
+    rest, top = 1 / size(200.0), size(160.0) / size(200.0)
+    assert str(summary).split("\n") == [
+        "m 7: cascade, Bouc-Wen hysteresis",
+        "  linear part divided by 1.00000, its magnitude at 200 Hz",
+        f"  gain at DC {rest:.5f}, in the flat band from 160 to 160 Hz {top:.5f} to {top:.5f}",
+        "  pole at 150 Hz, damping 0.350",
+        "  pole at 900 Hz, damping 1.000",
+        "  creep adds 10 % of the gain in the long run, with lags from 0.1 s to 30 s",
+        "  rate in the hysteresis held at 512.5 V/s; clamped samples are counted",
+        "  warning: not physical at reversals: the local slope falls to -0.125 mrad/V against d1 = 0.080 mrad/V, so "
+        "the modelled mirror first moves the wrong way, by 26.0 µrad on a slow drive",
+        "  warning: pole at 150 Hz lies outside the excited band (160 to 500 Hz): drift fitted as dynamics",
+        "  warning: pole at 900 Hz lies outside the excited band (160 to 500 Hz): extrapolated",
+        f"  warning: gain at DC {rest:.5f} is not the gain in the band, {top:.5f} to {top:.5f}",
+    ]
+    assert [root.in_band for root in summary.roots] == [False, False]
+    assert (summary.flat_band_hz, summary.normalise_at_hz, summary.rate_limit_v_s) == ((160.0, 160.0), 200.0, 512.5)

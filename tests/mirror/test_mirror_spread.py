@@ -615,3 +615,72 @@ def test_frequency_responses_of_draws_spread_as_linear_propagation_predicts(read
         spread = part(found / best - 1.0).std(axis=0)
         assert_allclose(spread, predicted, rtol=4.5 / math.sqrt(800), atol=2e-6)
         assert predicted.max() > 1e-3
+
+
+# ------------------------------------------------------------------------------------------------- numbers all unlike
+SIX = [
+    *("creep.weights", "bouc_wen.delta", "linear.poles.2"),
+    *("bouc_wen.epsilon", "creep.time_constants.2", "linear.pole_dampings.1"),
+]
+SIX_ERRORS = [0.1, 0.2, 0.05, 0.3, 0.15, 0.07]
+SIX_PAIRS = [0.5, -0.2, 0.1, 0.3, 0.0, 0.2, 0.0, 0.0, 0.1, 0.2, -0.3, 0.4, 0.0, 0.0, 0.0]
+
+
+def test_parts_of_every_table_are_known_and_moved_each_by_its_own_factor(read):
+    mirror = read(BOUC_WEN + table(SIX, SIX_ERRORS, SIX_PAIRS))
+    assert list(mirror_spread.parameter_units(mirror).items()) == list(
+        zip(SIX, ["", "s/V", "Hz", "rad/V", "s", ""], strict=True)
+    )
+    assert_allclose(mirror_spread.values(mirror), [2e-6, 4e-3, 400.0, -30e-6, 1.0, 0.35], rtol=1e-12)
+    found = mirror_spread.moved(mirror, np.array([2.0, 0.5, 1.25, 0.75, 1.5, 1.1]))
+    assert_allclose(found.creep.time_constants_s, (0.1, 1.5), rtol=1e-12)
+    assert_allclose(found.creep.weights_rad_v, (4e-6, 2e-6), rtol=1e-12)
+    assert_allclose(found.linear.poles_hz, (150.0, 500.0), rtol=1e-12)
+    assert_allclose(found.linear.pole_dampings, (0.385, 1.0), rtol=1e-12)
+    changed = {"epsilon_rad_v": pytest.approx(-22.5e-6), "delta_s_v": pytest.approx(2e-3)}
+    assert dict(found.bouc_wen) == dict(mirror.bouc_wen) | changed
+    assert (found.travel_rad, found.bias_v, found.uncertainty) == (mirror.travel_rad, 5.0, None)
+
+
+def test_the_covariance_of_factors_turns_with_the_sign_of_each_value(read):
+    """Only epsilon is below 0: its correlations with the others change their sign, and no other."""
+    found = mirror_spread.relative_covariance(read(BOUC_WEN + table(SIX, SIX_ERRORS, SIX_PAIRS)))
+    correlation = np.eye(6)
+    correlation[np.tril_indices(6, -1)] = SIX_PAIRS
+    correlation += np.tril(correlation, -1).T
+    signed = np.array(SIX_ERRORS) * [1, 1, 1, -1, 1, 1]
+    assert_allclose(found, signed[:, None] * correlation * signed, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("names", "errors", "pairs", "spread"),
+    [
+        (
+            ["prandtl_ishlinskii.weights.1", "creep.weights.2", "prandtl_ishlinskii.weights.3"],
+            [0.2, 0.9, 0.4],
+            [0.0, -0.5, 0.0],
+            math.sqrt(0.15**2 + 0.1**2 - 0.15 * 0.1),
+        ),
+        (["prandtl_ishlinskii.weights", "linear.poles.1"], [0.3, 0.2], [0.5], 0.3),
+        (["prandtl_ishlinskii.thresholds.2"], [0.3], None, 0.0),
+    ],
+)
+def test_the_spread_of_the_gain_is_that_of_the_weights_by_their_shares(read, names, errors, pairs, spread):
+    found = mirror_spread.relative_spread(read(PLAYS + table(names, errors, pairs)))
+    assert found == pytest.approx(spread, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "factors"),
+    [
+        (BOUC_WEN, ["linear.pole_dampings.1", "bouc_wen.d1"], [2.9, 1.0]),
+        (BOUC_WEN, ["bouc_wen.d1", "linear.poles.1"], [1.0, -0.5]),
+        (BOUC_WEN, ["creep.time_constants.1"], [10.5]),
+        (PLAYS, ["prandtl_ishlinskii.thresholds.2"], [2.5]),
+        (BOUC_WEN, ["bouc_wen.beta"], [4.0]),  # 1.6 1/V, above alpha
+    ],
+)
+def test_what_a_file_would_refuse_is_no_moved_mirror(read, text, names, factors):
+    mirror = read(text + table(names, [0.5] * len(names)))
+    assert mirror_spread.moved(mirror, np.array(factors)) is None
+    assert mirror_spread.moved(mirror, np.ones(len(names))) is not None
