@@ -865,3 +865,382 @@ def test_the_excited_band_of_a_long_record_is_that_of_its_sines(samples):
     band, moving, (finding,) = excitation([drive], ["the drive"], RATE_HZ, True)
     assert band == pytest.approx((120.0, 240.0), abs=0.01) and moving == [0]
     assert "the drive is excited from 120 to 240 Hz" in finding.message and not finding.refused
+
+
+# -------------------------------------------------------------------------- the words and places of findings, in full
+BOTH = multisine(1), multisine(2)
+
+
+def row_of(row):
+    return f"row {row}"
+
+
+def two_axes(drives, outputs, **options):
+    return recording_from_arrays(np.column_stack(drives), np.column_stack(outputs), RATE_HZ, "bench", **options)
+
+
+def said(ask):
+    with pytest.raises(RecordingError) as caught:
+        ask()
+    return str(caught.value)
+
+
+def with_samples(values, **changes):
+    changed = values.copy()
+    for at, value in changes.items():
+        changed[int(at[1:])] = value
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("drives", "outputs", "message"),
+    [
+        (
+            BOTH,
+            (BOTH[0], with_samples(BOTH[1], _70=math.nan, _900=math.inf)),
+            "sample 70 of the output 1 is nan, 2 such samples in all; remove or repair it, because hysteresis "
+            "remembers what happened in a gap.",
+        ),
+        (
+            (BOTH[0], with_samples(BOTH[1], _3999=-math.inf)),
+            BOTH,
+            "sample 3999 of the drive 1 is -inf, 1 such samples in all; remove or repair it, because hysteresis "
+            "remembers what happened in a gap.",
+        ),
+        (
+            BOTH,
+            (BOTH[0], with_samples(BOTH[1], _71=-3e33, _80=2e33)),
+            "sample 71 of the output 1 is -3e+33, its largest sample, and no converter gives a channel of less than "
+            "1e-30 or more than 1e+30; check its unit and scale, or remove or repair the sample.",
+        ),
+        (
+            (BOTH[0], with_samples(np.zeros(N), _500=2e-33, _600=-4e-33)),
+            BOTH,
+            "sample 600 of the drive 1 is -4e-33, its largest sample, and no converter gives a channel of less than "
+            "1e-30 or more than 1e+30; check its unit and scale, or remove or repair the sample.",
+        ),
+        (
+            BOTH,
+            (BOTH[0], np.full(N, -2.5)),
+            "the output 1, is constant at -2.5, so nothing can be learnt from it; choose another column or check the "
+            "sensor's wiring and range.",
+        ),
+        (
+            (BOTH[0], np.full(N, 1234567.0)),
+            BOTH,
+            "the input, the drive 1, is constant at 1.23457e+06, so nothing can be learnt from it; choose another "
+            "column or drive the mirror up and down.",
+        ),
+        (
+            [each[:199] for each in BOTH],
+            [each[:199] for each in BOTH],
+            "199 samples; at least 200 are needed to tell a hysteresis loop from noise and to hold some back for the "
+            "check; record longer or faster.",
+        ),
+    ],
+)
+def test_what_no_one_can_accept_of_a_second_channel_is_told_in_all_words(drives, outputs, message):
+    assert said(lambda: two_axes(drives, outputs)) == f"bench: {message}"
+
+
+def test_a_copy_of_several_inputs_is_named_after_the_one_that_weighs_most():
+    third = 2 * BOTH[0] / np.std(BOTH[0]) - 3 * BOTH[1] / np.std(BOTH[1])
+    message = said(lambda: two_axes((*BOTH, third), BOTH))
+    assert message.startswith("bench: the drive 2 is a copy of the drive 1 and others: only ")
+    assert message.endswith(
+        " % of its variance is its own, so their effects cannot be told apart; drive the inputs independently "
+        "(orthogonal multisines), or leave one out."
+    )
+    assert said(lambda: two_axes((*BOTH, -2 * BOTH[0]), BOTH)).startswith(
+        "bench: the drive 2 is a copy of the drive 0: only "
+    )
+
+
+@pytest.mark.parametrize(
+    ("label", "values", "drives", "row", "text"),
+    [
+        (
+            "the output 1",
+            np.maximum(SLOW, -0.9),
+            [SLOW],
+            754,
+            "the output 1 is clipped at -0.9: 3 flat tops, the first at row 754, 480 samples at exactly that value, "
+            "about 5.5 % of peak-to-peak cut off; widen the sensor's or the converter's range, or lower the drive",
+        ),
+        (
+            "the drive 1",
+            3 * np.clip(SLOW, -0.85, 2),
+            None,
+            736,
+            "the drive 1 is clipped at -2.55: 3 flat tops, the first at row 736, 588 samples at exactly that value, "
+            "about 8.2 % of peak-to-peak cut off; lower the drive, or widen the range of the converter that recorded "
+            "it",
+        ),
+        (
+            "y",
+            -clipped_laplace(90)[0],
+            [clipped_laplace(90)[1]],
+            35,
+            "y is clipped at -4.86223: 90 samples are exactly there and hardly any just beside it, the first at row "
+            "35; widen the sensor's or the converter's range, or lower the drive",
+        ),
+    ],
+    ids=["low", "drive", "piled up"],
+)
+def test_a_channel_that_is_clipped_below_is_told_with_place_count_and_share(label, values, drives, row, text):
+    (found,) = clipping(label, values, row_of, drives)
+    assert (found.kind, found.channel, found.row, found.refused, found.output) == ("clipping", label, row, True, None)
+    assert found.message == text
+
+
+def test_a_channel_that_is_clipped_on_both_sides_has_two_findings_highest_first():
+    found = clipping("y", np.clip(SLOW, -0.8, 0.9), row_of, [0.5 * SLOW, SLOW])
+    at = [np.flatnonzero(SLOW > 0.9), np.flatnonzero(SLOW < -0.8)]
+    assert [each.row for each in found] == [rows[0] for rows in at]
+    assert [each.message.split(", about")[0] for each in found] == [
+        f"y is clipped at {limit:g}: {count} flat tops, the first at row {rows[0]}, {rows.size} samples at exactly "
+        "that value"
+        for limit, count, rows in ((0.9, 4, at[0]), (-0.8, 3, at[1]))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("values", "drives", "text", "refused"),
+    [
+        (
+            np.round(SLOW * 7) / 7 * 3,
+            None,
+            "7.1 % of its peak-to-peak (15 levels); a finer converter would drive more evenly",
+            False,
+        ),
+        (
+            np.round(SLOW * 12) / 12 * 3,
+            [BOTH[0], SLOW],
+            "4.2 % of its peak-to-peak (25 levels); a hysteresis loop of 2 % would be 0.48 steps wide: use a smaller "
+            "range of the converter or a larger motion",
+            True,
+        ),
+        (
+            np.round(SLOW * 45) / 45 * 3,
+            [SLOW],
+            "1.1 % of its peak-to-peak (91 levels); a hysteresis loop of 2 % would be 1.8 steps wide: use a smaller "
+            "range of the converter or a larger motion",
+            False,
+        ),
+    ],
+    ids=["drive", "refused", "noted"],
+)
+def test_coarse_steps_are_told_with_their_size_share_and_levels(values, drives, text, refused):
+    (found,) = channel.quantisation("y 2", values, drives)
+    assert found.message == f"y 2 moves in steps of {quantum(values):.4g}, {text}"
+    assert (found.kind, found.channel, found.row, found.refused) == ("quantisation", "y 2", None, refused)
+
+
+def test_an_output_of_as_few_levels_as_its_drives_is_no_finding():
+    levels = np.round(SLOW * 12) / 12
+    assert channel.quantisation("y", 3 * levels, [levels]) == []
+    assert len(channel.quantisation("y", 3 * levels, [levels, SLOW])) == 1  # one of them is smooth
+    assert quantum(np.array([7.0, 7.0])) == 0.0
+
+
+def test_a_drift_is_told_with_its_sign_its_size_and_its_share():
+    drive, output = trend_of(0.2)
+    for sign in (7.0, -7.0):
+        (found,) = drift("y", sign * output, [drive, BOTH[1]])
+        assert found.message.startswith(f"y drifts by {sign * 0.2 * np.ptp(output):.4g} ± ")
+        assert found.message.endswith(
+            " over the record, 20 % of its peak-to-peak, where the drive does not: creep or a warming sensor; let it "
+            "settle before recording, or record shorter"
+        )
+        assert (found.kind, found.channel, found.row, found.refused) == ("drift", "y", None, False)
+
+
+def test_inputs_at_rest_are_told_in_the_words_of_their_own_fault():
+    """A faint one and one that stands still beside one that moves, by themselves and as some of several."""
+    inputs = [tones((40.0, 0.5), (60.0, 0.5)), 1e-4 * BOTH[1], np.full(N, 7.0)]
+    band, moving, found = excitation(inputs, ["a", "b", "c"], 500.0, alone=True)
+    assert (band[0], moving, [each.refused for each in found]) == (0.0, [0, 1, 2], [False, True, True])
+    power = np.var(inputs[1]) / np.var(inputs[0])
+    faint, still = f"b has {power:.1g} of the power of the strongest input: ", "c moves by 0 rms about 7: "
+    assert [each.message for each in found] == [
+        "a is excited from 19.88 to 30.12 Hz (99.9 % of its power); nothing outside that band can be learnt from this "
+        "record",
+        f"{faint}that is no excitation; drive it, or leave it out",
+        f"{still}that is no excitation; drive the mirror up and down",
+    ]
+    band, moving, found = excitation(inputs, ["a", "b", "c"], 500.0, alone=False)
+    assert (band, moving, [each.refused for each in found]) == ((19.875, 30.125), [0], [False] * 3)
+    rests = "that is no excitation; it rests, and other recordings have to tell what it does"
+    assert [each.message for each in found[1:]] == [faint + rests, still + rests]
+
+
+def test_the_second_sensor_that_leads_names_the_drive_that_it_leads():
+    outputs = (BOTH[0] + 0.01 * noise(3), delayed(BOTH[1], -0.004))
+    message = said(lambda: two_axes(BOTH, outputs))
+    assert message.startswith("bench: the output 1 leads the drive 1 by 159 ± 0.04 degrees at 110.")
+    assert message.endswith(
+        " Hz, 4 samples; an output cannot come before its drive: swap input and output if they are the wrong way "
+        "round, else align the channels in time. To take it on as it is: --accept lead (in Python accept=('lead',))."
+    )
+    found = two_axes(BOTH, outputs, accept=["lead"]).findings
+    assert [(f.kind, f.channel, f.output, f.refused) for f in found if f.kind == "lead"] == [
+        ("lead", "the output 1", 1, True)
+    ]
+
+
+def test_a_dead_sensor_and_a_clipped_one_are_refused_together_with_what_to_accept():
+    outputs = (np.minimum(SLOW, 0.7) * 3, noise(4))
+    drives = (SLOW, tones((31.0, 1.0), (33.0, 1.0)))
+    message = said(lambda: two_axes(drives, outputs, accept=["drift"]))
+    assert message.startswith("bench: the output 0 is clipped at 2.1: 4 flat tops, the first at sample ")
+    assert ". Also: the output 1 does not follow the drive: the coherence is at most 0." in message
+    assert message.endswith(
+        "; a dead or unplugged sensor, or the wrong column: check the wiring or name another channel. To take it on "
+        "as it is: --accept clipping --accept dead (in Python accept=('clipping', 'dead'))."
+    )
+    said(lambda: two_axes(drives, outputs, accept=["dead"]))
+    found = two_axes(drives, outputs, accept=["dead", "clipping"]).findings
+    assert [(f.kind, f.output) for f in found if f.refused] == [("clipping", 0), ("dead", 1)]
+
+
+@pytest.mark.parametrize(
+    ("given", "stated", "message"),
+    [
+        (
+            1000.0,
+            [(1000.4, "fs"), (1250.0, "dt")],
+            "f: two sample rates: 1000 Hz (given) and 1250 Hz (dt), 1.25 times as much; correct the wrong one (leave "
+            "the rate out to use that of the file).",
+        ),
+        (
+            None,
+            [(622.08, "fs"), (500.0, "dt")],
+            "f: two sample rates: 622.08 Hz (fs) and 500 Hz (dt), 0.8038 times as much; correct the wrong one.",
+        ),
+        (
+            622.08,
+            [(622.08, "fs"), (-800.0, "dt")],
+            "f (dt): the sample rate is -800.0; give the samples per second as a positive number in Hz.",
+        ),
+        (True, [], "f: the sample rate is True; give the samples per second as a positive number in Hz."),
+        (
+            None,
+            [],
+            "f: the file does not say how fast it was sampled; give the rate (--rate, rate_hz) in Hz, or name the "
+            "time column (time).",
+        ),
+    ],
+)
+def test_rates_that_contradict_each_other_are_told_in_all_words(given, stated, message):
+    assert said(lambda: agreed_rate("f", given, [StatedRate(*each) for each in stated])) == message
+
+
+def test_of_rates_that_agree_the_one_that_is_given_counts():
+    stated = [StatedRate(622.5, "fs"), StatedRate(622.0, "dt")]
+    assert agreed_rate("f", 622.08, stated) == 622.08
+    assert agreed_rate("f", None, stated) == 622.5
+
+
+CLOCK = np.arange(300) / 200.0
+
+
+@pytest.mark.parametrize(
+    ("time_s", "message"),
+    [
+        (with_samples(CLOCK, _9=math.inf, _12=math.nan), "row 9, 't': the time is inf; repair it or cut there."),
+        (
+            with_samples(CLOCK, _50=0.1),
+            "row 50, 't': time runs back from 0.245 to 0.1 s; two recordings may have been joined: cut them apart.",
+        ),
+        (
+            CLOCK + np.where(CLOCK < 0.5, 0.0, 0.05) + np.where(CLOCK < 1.0, 0.0, 0.1),
+            "row 100, 't': 0.055 s since the sample before, where 0.005 s is usual; 2 gaps, about 30 samples lost. Cut "
+            "the recording there, because hysteresis remembers what happened in the gap.",
+        ),
+        (
+            CLOCK + np.where(CLOCK < 1.0, 0.0, 0.015),
+            "row 200, 't': 0.02 s since the sample before, where 0.005 s is usual; 1 gap, about 3 samples lost. Cut "
+            "the recording there, because hysteresis remembers what happened in the gap.",
+        ),
+        (
+            with_samples(CLOCK, _100=0.496),
+            "row 100, 't': 0.001 s since the sample before, where 0.005 s is usual, once in all; samples were written "
+            "twice or late: remove them or record again.",
+        ),
+        (
+            with_samples(CLOCK, _100=0.495, _200=0.995),
+            "row 100, 't': 0 s since the sample before, where 0.005 s is usual, 2 times in all; samples were written "
+            "twice or late: remove them or record again.",
+        ),
+        (
+            0 * CLOCK + 3.25,
+            "'t': the time of all 300 samples is 3.25 s; write their true times, or take the column out of the file "
+            "and give the sample rate.",
+        ),
+    ],
+    ids=["inf", "back", "gaps", "gap", "late", "twice", "still"],
+)
+def test_a_time_that_cannot_be_is_told_with_its_row_and_its_steps(time_s, message):
+    assert said(lambda: rate_of_time("f", "'t'", time_s, row_of)) == f"f: {message}"
+
+
+def test_a_time_that_is_read_states_its_rate_and_what_it_was_told_by():
+    rate, found = rate_of_time("f", "'t'", np.round(CLOCK, 2), row_of)
+    assert rate == StatedRate(199.333333, "'t': 300 samples in 1.5 s")
+    (printed,) = found
+    assert (printed.kind, printed.channel, printed.row, printed.refused) == ("jitter", "'t'", None, False)
+    assert printed.message == (
+        "'t' is printed to 0.01 s, coarser than the step of 0.00502 s; gaps shorter than that would not show"
+    )
+    late = 5.0 + with_samples(CLOCK, _120=0.6011)
+    rate, found = rate_of_time("f", "'t'", late, row_of)
+    assert rate == StatedRate(200.0, "'t': 300 samples in 1.495 s")
+    assert [(each.kind, each.row, each.refused) for each in found] == [("jitter", 120, False)]
+    scatter = 100 * math.sqrt(2 * 0.0011**2 / 299) / 0.005
+    assert found[0].message == (
+        f"'t': the steps scatter by {scatter:.2g} % rms of 0.005 s, most at row 120 (0.0061 s); record with a hardware "
+        "clock, or resample to a constant step"
+    )
+
+
+@pytest.mark.parametrize("accept", ["drift", ["drift", "x"], ("gap",)])
+def test_what_cannot_be_accepted_is_told_as_it_was_given(accept):
+    assert said(lambda: recording_from_arrays(SINE, GOOD, RATE_HZ, "bench", accept=accept)) == (
+        f"bench: accept = {accept!r}; give a sequence of jitter, clipping, dead, quantisation, drift, unexcited, lead. "
+        "Other faults, such as gaps or nan, cannot be accepted."
+    )
+
+
+@pytest.mark.parametrize(
+    ("period", "message"),
+    [
+        (True, "period_samples is True; give a whole number of samples."),
+        (250.0, "period_samples is 250.0; give a whole number of samples."),
+        (1, "a period of 1 samples does not fit into 4000 samples; give the length of one period in samples."),
+        (4001, "a period of 4001 samples does not fit into 4000 samples; give the length of one period in samples."),
+        (-7, "a period of -7 samples does not fit into 4000 samples; give the length of one period in samples."),
+    ],
+)
+def test_a_period_that_is_none_is_told_in_all_words(period, message):
+    assert said(lambda: recording_from_arrays(SINE, GOOD, RATE_HZ, "bench", period)) == f"bench: {message}"
+    for fits in (2, np.int64(250), 4000):
+        found = recording_from_arrays(SINE, GOOD, RATE_HZ, "bench", fits).period_samples
+        assert found == fits and type(found) is int
+
+
+def test_recordings_that_do_not_go_together_are_told_by_name_and_number():
+    drives = np.column_stack(BOTH)
+    mixed = drives @ np.array([[1.0, 0.2, 0.4], [-0.3, 1.0, 0.7]])
+
+    def recorded(name, rows, columns=3):
+        return recording_from_arrays(drives[rows], mixed[rows, :columns], RATE_HZ, name, alone=False)
+
+    first, second = recorded("first", slice(0, 2000)), recorded("second", slice(2000, 4000))
+    check_together([first], [second])
+    assert said(lambda: check_together([first, second], [recorded("third", slice(0, 2000))])) == (
+        "third: the same data as first; give each recording once, and for validation one that is not fitted."
+    )
+    assert said(lambda: check_together([first], [recorded("third", slice(100, 2100), 2)])) == (
+        "third: 2 inputs and 2 outputs, where first has 2 and 3; name the same channels in each recording, in the same "
+        "order."
+    )
