@@ -22,8 +22,9 @@ from scipy.sparse import csc_array
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
 from microrad.lab.recording.formats import text as text_format
 from microrad.lab.recording.formats.arrays import stated_rate
+from microrad.lab.recording.formats.hdf5 import _lzf_bytes
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
-from microrad.lab.recording.formats.source import StatedRate
+from microrad.lab.recording.formats.source import StatedRate, is_time_name, time_unit
 from microrad.lab.recording.formats.tdms import _check_scales, check_structure
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
@@ -1376,3 +1377,369 @@ def test_a_text_that_is_as_long_as_its_head_is_whole(tmp_path, monkeypatch, size
     monkeypatch.setattr(text_format, "_HEAD_BYTES", 10)
     (tmp_path / "a.csv").write_bytes(b"#".ljust(size, b"a"))
     assert reason in refusal(tmp_path / "a.csv", 0, 1)
+
+
+# -------------------------------------------------------------------------------- five channels, each unlike the others
+FIVE = {
+    "u a": 5 * np.sin(2 * np.pi * 31 * TIME_S),
+    "u b": 2 + 3 * np.cos(2 * np.pi * 47 * TIME_S),
+    "x": 0.4 * np.sin(2 * np.pi * 31 * TIME_S - 0.1),
+    "y": 7 + 0.6 * np.cos(2 * np.pi * 47 * TIME_S - 0.2),
+    "z": 0.1 * np.sin(2 * np.pi * 31 * TIME_S - 0.3) + 0.2 * np.cos(2 * np.pi * 47 * TIME_S - 0.1),
+}
+FIVE_UNITS = ("V", "mV", "um", "urad", "nm")
+
+
+def five_csv(path):
+    lines = ["% taken by hand", "time," + ",".join(FIVE), "ms," + ",".join(FIVE_UNITS), "", "# remark"]
+    lines += [",".join(map(repr, row)) for row in np.column_stack([1e3 * TIME_S, *FIVE.values()]).tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def five_tdms(path):
+    with TdmsWriter(path) as file:
+        for (name, values), unit in zip(FIVE.items(), FIVE_UNITS, strict=True):
+            known = {"wf_increment": 1 / RATE_HZ, "unit_string": unit}
+            file.write_segment([ChannelObject("g", name, values, known)])
+
+
+def five_lvm(path):
+    head = ["LabVIEW Measurement", "Separator\tTab", "Decimal_Separator\t.", "X_Columns\tOne", "***End_of_Header***"]
+    head += ["", "Channels\t5", "Y_Unit_Label\t" + "\t".join(FIVE_UNITS), "Delta_X" + "\t5.0E-4" * 5]
+    head += ["***End_of_Header***", "X_Value\t" + "\t".join(FIVE)]
+    rows = ["\t".join(map(repr, row)) for row in np.column_stack([TIME_S, *FIVE.values()]).tolist()]
+    path.write_text("\n".join([*head, *rows]) + "\n", encoding="latin-1")
+
+
+def five_hdf5(path):
+    with h5py.File(path, "w") as file:
+        for (name, values), unit in zip(FIVE.items(), FIVE_UNITS, strict=True):
+            file[f"g/{name}"] = values
+            file[f"g/{name}"].attrs["unit"] = np.bytes_(unit)
+        file["g"].attrs["dt"] = 1 / RATE_HZ
+
+
+def five_npz(path):
+    np.savez(path, **FIVE, sampling_time=1 / RATE_HZ)
+
+
+def five_mat(path):
+    savemat(path, {"g": {**{name.replace(" ", ""): values for name, values in FIVE.items()}, "Fs": RATE_HZ}})
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "group", "units"),
+    [
+        ("a.csv", five_csv, "", FIVE_UNITS),
+        ("a.tdms", five_tdms, "g/", FIVE_UNITS),
+        ("a.lvm", five_lvm, "", FIVE_UNITS),
+        ("a.h5", five_hdf5, "g/", FIVE_UNITS),
+        ("a.npz", five_npz, "", ("",) * 5),
+        ("a.mat", five_mat, "g/", ("",) * 5),
+    ],
+)
+def test_a_part_with_periods_of_channels_in_another_order_has_all_that_is_its_own(tmp_path, name, write, group, units):
+    path = tmp_path / name
+    write(path)
+    names = [group + (each.replace(" ", "") if name.endswith(".mat") else each) for each in FIVE]
+    read = read_recording(
+        path,
+        (names[1], names[0]),
+        (names[4], names[2].rsplit("/", 1)[-1], names[3]),
+        RATE_HZ * 1.0004,
+        period_samples=80,
+        part_s=(0.0503, 0.31),
+        accept=("drift",),
+    )
+    values = list(FIVE.values())
+    np.testing.assert_allclose(read.drive, np.column_stack([values[1], values[0]])[101:620], atol=1e-12)
+    np.testing.assert_allclose(read.output, np.column_stack([values[4], values[2], values[3]])[101:620], atol=1e-12)
+    assert read.path == f"{path} from 0.0503 s to 0.31 s"
+    assert read.sha256 == digest_of(read.drive, read.output)
+    assert (read.rate_hz, read.period_samples) == (RATE_HZ * 1.0004, 80)
+    assert (read.input_names, read.output_names) == ((names[1], names[0]), (names[4], names[2], names[3]))
+    assert (read.input_units, read.output_units) == ((units[1], units[0]), (units[4], units[2], units[3]))
+    assert (read.samples, read.step_s, read.role) == (519, 1 / (RATE_HZ * 1.0004), "")
+    assert {f.channel.split(", ")[0] for f in read.findings if f.kind == "unexcited"} == {"the input"}
+    assert not (read.drive.flags.writeable or read.output.flags.writeable)
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "numbers", "words"),
+    [
+        (
+            "a.csv",
+            five_csv,
+            (1, 2, 8),
+            "there is no output column 8: the file has 6 columns, numbered from 0 to 5 (comma between them).",
+        ),
+        (
+            "a.csv",
+            five_csv,
+            ("u a", "u b", "zz"),
+            "no output column is named 'zz'; the nearest is 'z'. The columns are 'time', 'u a', 'u b', 'x', 'y', 'z'; "
+            "a number counted from 0 does as well.",
+        ),
+        (
+            "a.tdms",
+            five_tdms,
+            (0, 1, -1),
+            "there is no output channel -1: the TDMS file has 5 channels, numbered from 0 ('g/u a', 'g/u b', 'g/x', "
+            "'g/y', 'g/z').",
+        ),
+        (
+            "a.h5",
+            five_hdf5,
+            ("u a", "u b", "g/X"),
+            "no output channel is named 'g/X'; the nearest is 'g/x'. The channels are 'g/u a', 'g/u b', 'g/x', 'g/y', "
+            "'g/z'; a number counted from 0 does as well.",
+        ),
+        (
+            "a.npz",
+            five_npz,
+            ("u a", "u b", "sampling_time"),
+            "the output 'sampling_time' is no channel: 'sampling_time' is a single number; name an array.",
+        ),
+        (
+            "a.csv",
+            five_csv,
+            ("u a", "u b", "u b"),
+            "input and output are both column 2 ('u b'), so there is nothing to identify; give the drive as input and "
+            "the sensor as output.",
+        ),
+        ("a.lvm", five_lvm, (1, "u a", "x"), "channel 1 ('u a') is given twice as input; name it once."),
+    ],
+)
+def test_a_channel_that_is_none_is_told_with_those_that_are(tmp_path, name, write, numbers, words):
+    path = tmp_path / name
+    write(path)
+    assert refusal(path, numbers[:2], numbers[2]) == f"{path}: {words}"
+
+
+def test_a_sample_of_a_part_stands_where_it_stands_in_the_whole_file(tmp_path):
+    for name, write, place in (
+        ("a.npz", five_npz, "sample 311"),
+        ("a.csv", five_csv, None),
+        ("a.lvm", five_lvm, None),
+    ):
+        path = tmp_path / name
+        kept = FIVE["y"].copy()
+        FIVE["y"][311] = 1e40
+        try:
+            write(path)
+        finally:
+            FIVE["y"][:] = kept
+        lines = path.read_bytes().split(b"\n")
+        row = place or f"line {next(k for k, line in enumerate(lines, 1) if b'e+40' in line)}"
+        message = refusal(path, "u a", ("x", "y"), RATE_HZ, part_s=(0.1, None))
+        index = {"a.npz": "channel 3", "a.csv": "column 4", "a.lvm": "channel 4"}[name]
+        assert message.startswith(
+            f"{path} from 0.1 s: {row} of the output, {index} ('y') is 1e+40, its largest sample, and no converter"
+        )
+        assert read_recording(path, "u a", "x", part_s=(0.2, 0.4)).samples == 400
+
+
+@pytest.mark.parametrize(
+    ("part_s", "words"),
+    [
+        ((0.3, 0.2), "from 0.3 s to 0.2 s is no part of a recording of 0.5 s"),
+        ((0.3, 0.3), "from 0.3 s to 0.3 s is no part of a recording of 0.5 s"),
+        ((-0.1, 0.3), "from -0.1 s to 0.3 s is no part of a recording of 0.5 s"),
+        ((0.1, 0.6), "from 0.1 s to 0.6 s is no part of a recording of 0.5 s"),
+        ((0.7, None), "from 0.7 s to the end is no part of a recording of 0.5 s"),
+    ],
+)
+def test_times_that_are_no_part_are_told_in_all_words(tmp_path, part_s, words):
+    five_npz(tmp_path / "a.npz")
+    message = refusal(tmp_path / "a.npz", "u a", "x", part_s=part_s)
+    assert message == f"{tmp_path / 'a.npz'}: {words}; give two times within it, the earlier one first."
+
+
+def test_a_time_in_an_unknown_unit_or_that_is_a_signal_is_refused_in_all_words(tmp_path):
+    path = tmp_path / "a.csv"
+    five_csv(path)
+    assert refusal(path, "u a", "x", time="x") == (
+        f"{path}: column 3 ('x') is the time and a signal; name another one."
+    )
+    assert refusal(path, "u a", "x", time="y") == (
+        f"{path}: column 4 ('y'): the time is in 'urad'; convert it to one of s, sec, seconds, ms, us, µs, μs, ns, or "
+        "name no time column and give the rate."
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "found"),
+    [
+        ("t_ms", "", "ms"),
+        ("t_start_us", "", "us"),
+        ("t_ms", "ns", "ns"),
+        ("time (us)", "", "us"),
+        ("time_ms [s]", "", "s"),
+        ("time_stamp", "", "s"),
+        ("T_MS", "", "ms"),
+        ("run_ms/t", "", "s"),
+        ("t [min]", "", "min"),
+    ],
+)
+def test_the_unit_of_a_time_is_that_stated_else_in_brackets_else_behind_a_line(name, unit, found):
+    assert time_unit(name, unit) == found
+
+
+@pytest.mark.parametrize(
+    ("name", "is_time"),
+    [
+        ("t", True),
+        ("T", False),
+        ("Time", True),
+        ("ZEIT_ms", True),
+        ("time stamp", False),
+        ("TimeStamp_ns", True),
+        ("sec [s]", True),
+        ("a/b/temps", True),
+        ("time/u", False),
+        (" x_value ", True),
+        ("timesteps", False),
+        ("t_us (us)", True),
+        ("runtime", False),
+    ],
+)
+def test_a_name_that_means_time_is_told_from_one_that_holds_it(name, is_time):
+    assert is_time_name(name) is is_time
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "rate_hz", "words"),
+    [
+        ("a/b/FS", 622.08, 622.08, "a/b/FS = 622.08 Hz"),
+        ("fs/dt", np.array([[0.004]]), 250.0, "fs/dt = 0.004 s"),
+        ("Sample_Time", 3e-5, 1 / 3e-5, "Sample_Time = 3e-05 s"),
+        ("rate", "250", 250.0, "rate = 250 Hz"),
+        ("wf_increment", np.float32(0.25), 4.0, "wf_increment = 0.25 s"),
+    ],
+)
+def test_a_scalar_states_a_rate_in_its_own_words(name, value, rate_hz, words):
+    found = stated_rate(name, value)
+    assert found.rate_hz == pytest.approx(rate_hz, rel=1e-12) and found.words == words
+
+
+@pytest.mark.parametrize(
+    ("data", "size"),
+    [
+        (b"\x02abc", 3),
+        (b"\x02abc\x00d", 4),
+        (b"\x02abc\x20\x00", 6),  # three bytes of one back
+        (b"\x02abc\x40\x02", 7),  # four of three back, which is the first
+        (b"\x02abc\x40\x03", 0),  # of four back: before the beginning
+        (b"\x02abc\xe0\x05\x01\x01de", 19),  # 7 + 5 + 2 of two back, then two as they are
+        (b"\x1f" + b"x" * 32 + b"\x20\x1f", 35),
+        (b"\x1f" + b"x" * 32 + b"\x20\x20", 0),
+        (b"\x1f" + b"x" * 32 + b"\xc0\x07\x00e", 41),
+        (b"\x02ab", 0),
+        (b"\x02abc\x20", 0),
+        (b"\x02abc\xe0\x05", 0),
+        (b"", 0),
+    ],
+)
+def test_bytes_that_a_packed_piece_holds_are_counted_without_unpacking_it(data, size):
+    assert _lzf_bytes(data) == size
+
+
+def test_a_copy_from_far_back_counts_its_distance_from_both_of_its_bytes():
+    runs = (b"\x1f" + b"x" * 32) * 17  # 544 bytes
+    assert _lzf_bytes(runs + b"\x22\x1f") == 547  # 2 x 256 + 31 + 1 back: the first
+    assert _lzf_bytes(runs + b"\x22\x20") == 0
+    assert _lzf_bytes(runs + b"\x21\xff") == 547
+
+
+@pytest.mark.parametrize(
+    ("begin", "words"),
+    [
+        (
+            b"TDSh" + bytes(24),
+            "this is the index that LabVIEW writes beside a TDMS file, without the data; name the .tdms file.",
+        ),
+        (b"BZh91AY", "the file is compressed; unpack it first."),
+        (b"\xfd7zXZ\x00", "the file is compressed; unpack it first."),
+        (b"7z\xbc\xaf\x27", "the file is compressed; unpack it first."),
+        (
+            b"\x93NUMPY\x01\x00",
+            "the name says a LabVIEW TDMS file, which begins with 'TDSm', and the first bytes are "
+            "'\\x93NUMPY\\u0001\\u0000'; rename it to 'a.npy'.",
+        ),
+        (
+            b"\x89HDF\r\n\x1a\n",
+            "the name says a LabVIEW TDMS file, which begins with 'TDSm', and the first bytes are '\\x89HDF'; rename "
+            "it to 'a.h5'.",
+        ),
+        (
+            b'"LabVIEW Measurement"\n',
+            "the name says a LabVIEW TDMS file, which begins with 'TDSm', and the first bytes are '\"LabVIEW "
+            "Measurement\"'; if it is text, rename it to 'a.lvm', else record again.",
+        ),
+    ],
+)
+def test_a_file_of_another_content_than_its_name_says_is_told_in_all_words(tmp_path, begin, words):
+    path = tmp_path / "a.tdms"
+    path.write_bytes(begin)
+    assert refusal(path, 0, 1) == f"{path}: {words}"
+
+
+@pytest.mark.parametrize(("fault", "words"), [(PermissionError(13, "no"), "[Errno 13] no"), (OSError("gone"), "gone")])
+def test_a_file_that_can_be_seen_and_not_read_says_why(tmp_path, monkeypatch, fault, words):
+    path = tmp_path / "a.csv"
+    five_csv(path)
+
+    def refuse(*_):
+        raise fault
+
+    monkeypatch.setattr(files, "read_bytes", refuse)
+    assert refusal(path, 1, 2) == f"{path}: the file cannot be read ({words}); check its permissions."
+
+
+def test_an_array_that_unpacks_to_too_much_is_told_with_all_its_sizes(tmp_path):
+    path = tmp_path / "a.bin"
+    path.write_bytes(bytes(20_000_000))
+    assert files.most_unpacked(path) == 400_000_000
+    assert files.too_large(path, (5_000_000, 10), 8) == ""
+    assert files.too_large(path, (3, 40_000_000), 4) == (
+        "states 4e+07 samples, 480 MB in a file of 20 MB, and at most 400 MB are unpacked from that; cut out the part "
+        "that you need, or save it without compression"
+    )
+
+
+def test_a_third_channel_that_starts_later_is_named_with_the_first_of_those_that_are_read(tmp_path):
+    path = tmp_path / "a.tdms"
+    begin = np.datetime64("2026-01-01T12:00:00.000000")
+    with TdmsWriter(path) as file:
+        for name, late_us, offset, step in (("a", 0, 0.25, 1e-3), ("b", 0, 0.25, 5e-4), ("c", 1000, 0.2517, 1e-3)):
+            known = {"wf_increment": step, "wf_start_time": begin + np.timedelta64(late_us, "us")}
+            file.write_segment([ChannelObject("g", name, DRIVE, {**known, "wf_start_offset": offset})])
+    assert refusal(path, "b", ("a", "c")) == (
+        f"{path}: 'g/c' starts 0.0027 s apart from 'g/b' (wf_start_time, wf_start_offset; one step is 0.0005 s); "
+        "record both in one task, or cut them to their common time."
+    )
+    assert refusal(path, "a", "b") == (
+        f"{path}: two sample rates: 1000 Hz (wf_increment = 0.001 s of 'g/a') and 2000 Hz (wf_increment = 0.0005 s of "
+        "'g/b'), 2 times as much; correct the wrong one."
+    )
+
+
+def test_channels_of_other_lengths_are_told_by_their_lengths(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=DRIVE, v=OUTPUT, w=OUTPUT[:777], fs=RATE_HZ)
+    assert refusal(path, "u", ("v", "w")) == (
+        f"{path}: channel 0 ('u') has 1000 samples and channel 2 ('w') 777; name channels that were sampled together, "
+        "or cut them to their common time."
+    )
+
+
+def test_a_rate_of_an_inner_group_goes_before_that_of_an_outer_one(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["run/left/u"], file["run/left/y"], file["run/y"] = DRIVE, OUTPUT, OUTPUT
+        file["run/fs"], file["run/left/dt"] = 400.0, 0.002
+        file.attrs["rate"] = 90.0
+        file["y"] = OUTPUT
+    assert read_recording(path, "run/left/u", "run/left/y").rate_hz == 500.0
+    assert "500 Hz (run/left/dt = 0.002 s) and 400 Hz (run/fs = 400 Hz), 0.8 times" in refusal(path, "u", "run/y")
+    assert "500 Hz (run/left/dt = 0.002 s) and 90 Hz (rate = 90 Hz), 0.18 times" in refusal(path, "u", 3)
