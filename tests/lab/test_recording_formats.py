@@ -1711,11 +1711,11 @@ def test_a_third_channel_that_starts_later_is_named_with_the_first_of_those_that
     path = tmp_path / "a.tdms"
     begin = np.datetime64("2026-01-01T12:00:00.000000")
     with TdmsWriter(path) as file:
-        for name, late_us, offset, step in (("a", 0, 0.25, 1e-3), ("b", 0, 0.25, 5e-4), ("c", 1000, 0.2517, 1e-3)):
+        for name, late_us, offset, step in (("a", 0, 0.25, 1e-3), ("b", 0, 0.25, 5e-4), ("c", 100, 0.2503, 1e-3)):
             known = {"wf_increment": step, "wf_start_time": begin + np.timedelta64(late_us, "us")}
             file.write_segment([ChannelObject("g", name, DRIVE, {**known, "wf_start_offset": offset})])
     assert refusal(path, "b", ("a", "c")) == (
-        f"{path}: 'g/c' starts 0.0027 s apart from 'g/b' (wf_start_time, wf_start_offset; one step is 0.0005 s); "
+        f"{path}: 'g/c' starts 0.0004 s apart from 'g/b' (wf_start_time, wf_start_offset; one step is 0.0005 s); "
         "record both in one task, or cut them to their common time."
     )
     assert refusal(path, "a", "b") == (

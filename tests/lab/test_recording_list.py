@@ -419,3 +419,205 @@ def test_drives_and_outputs_are_each_held_against_their_own_unit(tmp_path, drive
     else:
         (found,) = read_list(write_list(tmp_path, text)).recordings
         assert (found.input_units, found.output_units) == (("mV", "mV"), ("um", "um"))
+
+
+# ------------------------------------------------------------------------------- several recordings in other folders
+def two_folders(folder):
+    """A list in one folder, recordings in two others, each of other channels and rates."""
+    (folder / "one").mkdir()
+    (folder / "two" / "deep").mkdir(parents=True)
+    write_csv(folder / "one" / "a.csv", "t,ux (V),uy (V),x (um),y (um)")
+    np.savez(folder / "two" / "u.npz", drives=DRIVE.T[:, ::-1][:, None, :], fs=2 * RATE_HZ)
+    np.savez(folder / "two" / "deep" / "y.npz", sensors=OUTPUT.T[:, ::-1][:, None, :] + 7.0)
+
+
+COMMON = """
+rate = "1 kHz"
+accept = ["drift", "lead"]
+input = ["ux (V)", 2]
+output = [4, "x (um)"]
+output_unit = "um"
+
+[recording.first]
+file = "one/a.csv"
+from = "0.1 s"
+to = "0.45 s"
+period = 50
+role = "broadband"
+
+[recording.held]
+file = "one/a.csv"
+from = "0.45 s"
+role = "validation"
+accept = ["drift"]
+
+[recording.arrays]
+file = "two/u.npz"
+output_file = "two/deep/y.npz"
+input = "drives"
+output = "sensors"
+axes = ["channels", "realisations", "samples"]
+rate = "2 kHz"
+period = 40
+from = "0.05 s"
+input_unit = "mV"
+output_unit = "mrad"
+role = "loops"
+"""
+
+
+def test_entries_take_what_is_common_unless_they_have_their_own(tmp_path):
+    two_folders(tmp_path)
+    found = read_list(write_list(tmp_path, COMMON))
+    (first, arrays), (held,) = found.recordings, found.validation
+    assert [each.role for each in (first, arrays, held)] == ["broadband", "loops", "validation"]
+    assert first.path == f"{tmp_path / 'one' / 'a.csv'} from 0.1 s to 0.45 s"
+    assert held.path == f"{tmp_path / 'one' / 'a.csv'} from 0.45 s"
+    assert arrays.path == f"{tmp_path / 'two' / 'u.npz'} realisation 0 from 0.05 s"
+    assert [each.rate_hz for each in (first, held, arrays)] == [1000.0, 1000.0, 2000.0]
+    assert [each.period_samples for each in (first, held, arrays)] == [50, None, 40]
+    assert (first.input_names, first.output_names) == (("ux (V)", "uy (V)"), ("y (um)", "x (um)"))
+    assert (arrays.input_names, arrays.output_names) == (
+        ("drives[0]", "drives[1]"),
+        ("sensors[0]", "sensors[1]"),
+    )
+    assert (first.input_units, first.output_units) == (("V", "V"), ("um", "um"))
+    assert (arrays.input_units, arrays.output_units) == (("mV", "mV"), ("mrad", "mrad"))
+    np.testing.assert_allclose(first.output, OUTPUT[100:450, ::-1])
+    np.testing.assert_allclose(held.drive, DRIVE[450:])
+    np.testing.assert_allclose(arrays.drive, DRIVE[::-1][100:])
+    np.testing.assert_allclose(arrays.output, OUTPUT[::-1][100:] + 7.0)
+    assert (found.name, found.lever_arm_m, found.positions_m, found.signs) == (None, None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'file = "one/a.csv"\nfrom = "0.1 s"',
+            'file = "one/b.csv"\nfrom = "0.1 s"',
+            "[recording.first]: {folder}/one/b.csv: there is no such file; check the path (nearest name in that "
+            "directory: 'a.csv').",
+        ),
+        (
+            'output_file = "two/deep/y.npz"',
+            'output_file = "two/y.npz"',
+            "[recording.arrays]: {folder}/two/y.npz: there is no such file; check the path (nearest name in that "
+            "directory: 'u.npz').",
+        ),
+        (
+            "period = 50",
+            "period = 351",
+            "[recording.first]: {folder}/one/a.csv from 0.1 s to 0.45 s: a period of 351 samples does not fit into 350 "
+            "samples; give the length of one period in samples.",
+        ),
+        (
+            'rate = "2 kHz"',
+            'rate = "2.5 kHz"',
+            "[recording.arrays]: {folder}/two/u.npz: two sample rates: 2500 Hz (given) and 2000 Hz (fs = 2000 Hz), 0.8 "
+            "times as much; correct the wrong one (leave the rate out to use that of the file).",
+        ),
+        (
+            'output_unit = "um"',
+            'output_unit = "mm"',
+            "[recording.first]: {folder}/one/a.csv from 0.1 s to 0.45 s: the output is to be read in mm and the file "
+            "says um; give the unit that the file says, or convert its values.",
+        ),
+        (
+            'accept = ["drift", "lead"]',
+            'accept = ["drift", "lead"]\nsigns = [[1, 1, 0], [-1]]',
+            "signs has rows of 3, 1 items and there are 2 outputs and 2 inputs; give a row for each output, with an "
+            "item for each input.",
+        ),
+        (
+            'accept = ["drift", "lead"]',
+            'accept = ["drift", "lead"]\npositions = [["1 mm", "2 mm"], ["3 mm", "4 mm"], ["5 mm", "7 mm"]]',
+            "positions has 3 places and there are 2 outputs, y (um), x (um); give one place for each, in their order.",
+        ),
+        (
+            'output = [4, "x (um)"]',
+            'output = [4, "ux (V)"]',
+            "[recording.first]: {folder}/one/a.csv: input and output are both column 1 ('ux (V)'), so there is nothing "
+            "to identify; give the drive as input and the sensor as output.",
+        ),
+    ],
+)
+def test_what_is_wrong_with_one_of_several_is_told_with_its_place_in_the_list(tmp_path, old, new, words):
+    two_folders(tmp_path)
+    assert old in COMMON
+    text = COMMON.replace(old, new, 1)
+    mark = ", " if words.startswith("[") else ": "
+    assert refusal(tmp_path, text) == f"{tmp_path / 'list.toml'}{mark}{words.format(folder=tmp_path)}"
+
+
+def test_findings_of_an_entry_are_kept_behind_its_place_in_the_list(tmp_path):
+    two_folders(tmp_path)
+    table = np.column_stack((TIME_S, DRIVE, OUTPUT[:, 0], np.minimum(OUTPUT[:, 1], 0.3)))
+    text = "t,ux (V),uy (V),x (um),y (um)\n" + "".join(",".join(map(repr, row)) + "\n" for row in table.tolist())
+    (tmp_path / "one" / "a.csv").write_text(text)
+    with pytest.raises(RecordingError) as caught:
+        read_list(write_list(tmp_path, COMMON))
+    assert str(caught.value).startswith(
+        f"{tmp_path / 'list.toml'}, [recording.first]: {tmp_path}/one/a.csv from 0.1 s to 0.45 s: the output, column 4 "
+        "('y (um)') is clipped at 0.3: "
+    )
+    assert [(each.kind, each.output) for each in caught.value.findings] == [("clipping", 0)]
+    both = COMMON.replace('["drift"', '["clipping", "drift"')
+    assert [each.refused for r in read_list(write_list(tmp_path, both)).recordings for each in r.findings].count(True)
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        (
+            'accept = ["drift", "lead", "drift"]',
+            'holds "drift", which stands twice; a list of different words out of jitter, clipping, dead, quantisation, '
+            "drift, unexcited, lead",
+        ),
+        (
+            'axes = ["samples", "period"]',
+            'holds "period", which is none of them; a list of different words out of samples, channels, realisations, '
+            "periods",
+        ),
+        (
+            'input = ["u", ""]',
+            'holds "", which is no channel; the name of a channel, its number from 0, or a list of them',
+        ),
+        (
+            "output = [1, false]",
+            "holds false, which is no channel; the name of a channel, its number from 0, or a list of them",
+        ),
+        (
+            "signs = [[1, 0], [2, -1]]",
+            "has an item that is none of 1, -1 and 0; a list for each output, with 1, -1 or 0 for each input",
+        ),
+        (
+            'positions = [["1 mm", "2 mm"], ["3 mm"]]',
+            "has a place that is no pair; a list of x and y for each output, as lengths",
+        ),
+    ],
+)
+def test_a_second_item_that_is_none_is_told_in_all_words(tmp_path, line, told):
+    common = {"input": "input = 1", "output": "output = 2"} | {line.partition(" ")[0]: line}
+    found = faults(tmp_path, "\n".join(common.values()) + '\n[recording.a]\nfile = "a.csv"\n')
+    (reason,) = found.values()
+    assert reason.startswith(told), reason
+
+
+def test_the_second_of_two_validations_is_held_against_each_that_is_fitted(tmp_path):
+    entry = '[recording.{}]\nfile = "{}"\ninput = 1\noutput = 2\nfrom = "{} s"\nto = "{} s"\n'
+    held = 'role = "validation"\n'
+    text = (
+        entry.format("f", "a.csv", 0, 1)
+        + entry.format("g", "a.csv", 2, 3)
+        + entry.format("v", "a.csv", 1, 2)
+        + held
+        + entry.format("w", "a.csv", 2.5, 4)
+        + held
+        + entry.format("other", "b.csv", 0, 9)
+        + held
+    )
+    assert faults(tmp_path, text) == {
+        ("recording.w", 20): "takes samples for validation that [recording.g] fits; two parts of the file (from, to) "
+        "without common samples"
+    }
