@@ -10,6 +10,7 @@ from scipy.io import savemat
 from microrad.lab.identify import IdentificationError
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.recording import AXES, RecordingError, multisine_recordings, read_arrays
+from microrad.lab.recording.records import digest_of
 from places import DATA, ROOT
 
 RATE_HZ = 1000.0
@@ -333,3 +334,175 @@ def test_a_period_has_to_fit_into_the_part_that_is_read(tmp_path):
     assert 300 <= count <= 301
     told = refusal(path, "u", "y", period_samples=350, **options)
     assert f"a period of 350 samples does not fit into {count} samples" in told
+
+
+# --------------------------------------------------------------------------------- arrays whose axes are all unlike
+def unlike(seed=21):
+    """Two drives and three outputs, five realisations of three periods of 230 samples."""
+    rng = np.random.Generator(np.random.Philox(seed))
+    drive = np.repeat(rng.standard_normal((230, 2, 5, 1)), 3, axis=3)
+    mixed = np.stack([drive[:, 0] - 0.4 * drive[:, 1], 0.3 * drive[:, 0] + drive[:, 1], drive[:, 1]], axis=1)
+    return drive, mixed + 0.01 * rng.standard_normal(mixed.shape)
+
+
+FEW, SEEN = unlike()
+TURNED = ("periods", "realisations", "samples", "channels")
+
+
+def test_arrays_in_an_order_of_their_own_with_a_part_that_cuts_through_a_period(tmp_path):
+    path, other = tmp_path / "u.npz", tmp_path / "y.h5"
+    np.savez(path, both=FEW.transpose(3, 2, 0, 1), fs=622.08)
+    with h5py.File(other, "w") as file:
+        file["run/both"] = SEEN.transpose(3, 2, 0, 1)
+        file["run/both"].attrs["unit"] = "um"
+        file["run"].attrs["rate"] = 622.2
+    read = read_arrays(path, axes=TURNED, output_path=other, part_s=(0.1, 1.0))
+    kept = slice(round(0.1 * 622.08), round(622.08))
+    assert len(read) == 5
+    for number, one in enumerate(read):
+        whole = [np.concatenate([each[:, :, number, p] for p in range(3)])[kept] for each in (FEW, SEEN)]
+        np.testing.assert_array_equal(one.drive, whole[0])
+        np.testing.assert_array_equal(one.output, whole[1])
+        assert one.path == f"{path} realisation {number} from 0.1 s to 1 s"
+        assert one.sha256 == digest_of(one.drive, one.output)
+        assert (one.rate_hz, one.period_samples) == (622.08, 230)
+        assert (one.input_units, one.output_units) == (("", ""), ("um",) * 3)
+        assert one.input_names == ("both[0]", "both[1]")
+        assert one.output_names == ("run/both[0]", "run/both[1]", "run/both[2]")
+        assert not (one.drive.flags.writeable or one.output.flags.writeable)
+
+
+@pytest.mark.parametrize(
+    ("arrays", "axes", "words"),
+    [
+        (
+            {"u": FEW, "y": SEEN[:, :, :4]},
+            AXES,
+            "'y' has 4 realisations, where the drives, 'u' in {path}, have 5; give arrays that were recorded together, "
+            "and their axes in order (--axes).",
+        ),
+        (
+            {"u": FEW, "y": SEEN[..., :2]},
+            AXES,
+            "'y' has 2 periods, where the drives, 'u' in {path}, have 3; give arrays that were recorded together, and "
+            "their axes in order (--axes).",
+        ),
+        (
+            {"u": FEW, "y": SEEN[:225]},
+            AXES,
+            "'y' has 225 samples, where the drives, 'u' in {path}, have 230; give arrays that were recorded together, "
+            "and their axes in order (--axes).",
+        ),
+        (
+            {"u": FEW, "y": SEEN},
+            AXES[:3],
+            "the input 'u' has the shape (230, 2, 5, 3) and --axes (axes) names 3; name each axis of the array once, "
+            "in its order.",
+        ),
+        (
+            {"u": FEW, "y": SEEN},
+            ("channels", "samples", "realisations", "periods"),
+            "the axis of 'u' that --axes (axes) calls samples has 2, and at least 200 are needed; correct the order of "
+            "the axes, or record longer.",
+        ),
+        (
+            {"u": FEW, "w": SEEN},
+            AXES,
+            "no one array of outputs is named 'y'; the file holds 'u' of shape (230, 2, 5, 3), 'w' of shape (230, 3, "
+            "5, 3).",
+        ),
+        (
+            {"u": FEW, "y": SEEN},
+            ("samples", "channels", "realization", "periods"),
+            "--axes (axes) is 'samples,channels,realization,periods': 'realization' is no axis, realisations is; name "
+            "each axis of the array in its order, out of samples, channels, realisations, periods.",
+        ),
+        (
+            {"u": FEW, "y": SEEN},
+            ("samples", "channels", "channels", "periods"),
+            "--axes (axes) is 'samples,channels,channels,periods': channels stands twice; name each axis of the array "
+            "in its order, out of samples, channels, realisations, periods.",
+        ),
+        (
+            {"u": FEW, "y": SEEN},
+            ("channels", "periods"),
+            "--axes (axes) is 'channels,periods', without samples; name each axis of the array in its order, out of "
+            "samples, channels, realisations, periods.",
+        ),
+        (
+            {"u": FEW, "y": SEEN},
+            "samples",
+            "--axes (axes) is 'samples'; give a sequence of words: name each axis of the array in its order, out of "
+            "samples, channels, realisations, periods.",
+        ),
+    ],
+)
+def test_arrays_that_do_not_fit_their_axes_are_told_in_all_words(tmp_path, arrays, axes, words):
+    path = tmp_path / "a.npz"
+    np.savez(path, **arrays, fs=RATE_HZ)
+    assert refusal(path, "u", "y", axes=axes) == f"{path}: {words.format(path=path)}"
+
+
+def test_which_array_is_meant_is_asked_with_all_that_there_are(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=FEW, y=SEEN, v=FEW, flat=np.arange(300.0), fs=RATE_HZ)
+    shapes = "'u' of shape (230, 2, 5, 3), 'y' of shape (230, 3, 5, 3), 'v' of shape (230, 2, 5, 3), 'flat' of shape "
+    assert refusal(path, "u") == (
+        f"{path}: 3 arrays have 4 axes, as --axes (axes) says, so which one holds the outputs is not plain: name it "
+        f"(--output). The file holds {shapes}(300,)."
+    )
+    assert refusal(path, None, "y", axes=("samples", "channels")) == (
+        f"{path}: no array has 2 axes, as --axes (axes) says, so which one holds the inputs is not plain: name it "
+        f"(--input). The file holds {shapes}(300,)."
+    )
+    assert refusal(path, "y", "y") == (
+        f"{path}: input and output are both 'y'; name two arrays (--input, --output), or the file of the outputs "
+        "(--output-file, output_path)."
+    )
+    assert refusal(path, "u", "y", period_samples=230) == (
+        f"{path}: --axes (axes) says where the periods are; leave out --period (period_samples)."
+    )
+    assert refusal(path, "u", "y", accept="drift").startswith(f"{path}: accept = 'drift'; give a sequence of jitter,")
+    assert refusal(path, "u", "y", rate_hz=-2.0) == (
+        f"{path}: the sample rate is -2.0; give the samples per second as a positive number in Hz."
+    )
+
+
+def test_a_period_of_the_second_channel_that_differs_is_named_with_its_share(tmp_path):
+    path = tmp_path / "a.npz"
+    drive = FEW - FEW.mean(axis=0)
+    drive[:, 1, :, 2] *= 1.75
+    np.savez(path, u=drive, y=SEEN, fs=RATE_HZ)
+    size = np.sqrt(np.mean((drive - drive.mean(axis=0))[:, 1] ** 2))
+    share = 0.75 * np.sqrt(np.mean(drive[:, 1, :, 0] ** 2)) / size
+    assert refusal(path, "u", "y") == (
+        f"{path}: channel 1 of 'u' differs from period 0 to 2 by {100 * share:.0f} % of its rms, and a drive is the "
+        "same in each period: correct the order in --axes (axes)."
+    )
+
+
+def test_a_bad_sample_of_an_output_in_another_file_is_named_with_realisation_period_and_file(tmp_path):
+    path, other = tmp_path / "u.npy", tmp_path / "y.npy"
+    np.save(path, FEW)
+    bad = SEEN.copy()
+    bad[7, 2, 3, 1] = bad[9, 2, 3, 2] = np.inf
+    np.save(other, bad)
+    for part_s, name in (((0.0, None), ""), ((0.2, None), " from 0.2 s")):
+        assert refusal(path, axes=AXES, rate_hz=RATE_HZ, output_path=other, part_s=part_s) == (
+            f"{path} realisation 3{name}: sample 7 of period 1 of the output, output[2] of {other} is inf, 2 such "
+            "samples in all; remove or repair it, because hysteresis remembers what happened in a gap."
+        )
+
+
+def test_realisations_of_arrays_in_memory_are_named_and_joined_period_by_period():
+    found = multisine_recordings(FEW, SEEN, 622.08, "bench 2")
+    assert [each.path for each in found] == [f"bench 2 realisation {r}" for r in range(5)]
+    assert {(each.rate_hz, each.period_samples, each.samples) for each in found} == {(622.08, 230, 690)}
+    np.testing.assert_array_equal(found[4].output[460:, 2], SEEN[:, 2, 4, 2])
+    for drive, output in ((FEW, SEEN[..., :2]), (FEW[:, :, :4], SEEN), (FEW[:225], SEEN), (FEW[..., 0], SEEN)):
+        with pytest.raises(RecordingError) as caught:
+            multisine_recordings(drive, output, 622.08, "bench 2")
+        assert str(caught.value) == (
+            f"bench 2: drive has shape {drive.shape} and output {output.shape}; give (samples, channels, realisations, "
+            "periods) with the same samples, realisations and periods."
+        )

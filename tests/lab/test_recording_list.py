@@ -570,7 +570,7 @@ def test_findings_of_an_entry_are_kept_behind_its_place_in_the_list(tmp_path):
     ("line", "told"),
     [
         (
-            'accept = ["drift", "lead", "drift"]',
+            'accept = ["lead", "drift", "drift", "noise"]',
             'holds "drift", which stands twice; a list of different words out of jitter, clipping, dead, quantisation, '
             "drift, unexcited, lead",
         ),
