@@ -1,5 +1,8 @@
 """A recorded motion of the line of sight from the files of a laboratory: its axes, its unit, and what is refused."""
 
+import hashlib
+
+import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -110,3 +113,112 @@ def test_one_of_several_channels_is_read_as_a_signal_by_its_name(tmp_path):
     alone = read_signal(csv(tmp_path / "b.csv", "power (W)", X))
     assert (alone.name, alone.unit, alone.rate_hz) == ("power (W)", "W", None)
     assert read_signal(csv(tmp_path / "b.csv", "power (W)", X), rate_hz=40.0).rate_hz == 40.0
+
+
+# -------------------------------------------------------------------------------------------------- refusals in full
+@pytest.mark.parametrize(
+    ("heading", "options", "words"),
+    [
+        (
+            "time,x (urad),y (V)",
+            {"axes": ("2",)},
+            "column 2 ('y (V)') is in 'V', which is no angle; name channels of angles (--axes, axes), in urad or "
+            "arcsec for example, or convert it.",
+        ),
+        (
+            "time,x (urad),y",
+            {"axes": (1, 2)},
+            "column 2 ('y'): no unit is stated; give it (--unit, unit), 'urad' for example.",
+        ),
+        (
+            "time,x (urad),y (mrad)",
+            {"axes": (2, 1), "unit": "mrad"},
+            "column 1 ('x (urad)') is in 'urad' and mrad is given; leave out the unit, or correct the file.",
+        ),
+        (
+            "time,x (urad),y (urad)",
+            {"axes": (2, 1, 2)},
+            "3 channels ('y (urad)', 'x (urad)', 'y (urad)') as axes; name one to three that differ (--axes, axes).",
+        ),
+        (
+            "time,x (urad),y (urad)",
+            {"axes": (1, 2), "time": 1},
+            "column 1 ('x (urad)') is the time and a signal; name another one.",
+        ),
+        (
+            "time,x (urad),y (urad)",
+            {"rate_hz": 622.08},
+            "two sample rates: 622.08 Hz (given) and 500 Hz (column 0 ('time'): 400 samples in 0.798 s), 0.8038 times "
+            "as much; correct the wrong one (leave the rate out to use that of the file).",
+        ),
+        (
+            "a,x (urad),y (urad)",
+            {"axes": (1,)},
+            "the file does not say how fast it was sampled; give the rate (--rate, rate_hz) in Hz, or name the time "
+            "column (time).",
+        ),
+        (
+            "time,x (urad),y (urad)",
+            {"rate_hz": 0},
+            "the sample rate is 0; give the samples per second as a positive number in Hz.",
+        ),
+    ],
+)
+def test_a_motion_is_refused_in_all_words(tmp_path, heading, options, words):
+    path = csv(tmp_path / "jitter.csv", heading, TIME, X, Y)
+    with pytest.raises(RecordingError) as refused:
+        read_motion(path, **options)
+    assert str(refused.value) == f"{path}: {words}"
+
+
+def test_units_that_are_one_by_other_names_agree_and_each_axis_has_its_own(tmp_path):
+    path = csv(tmp_path / "jitter.csv", "time (ms),x (urad),y (mrad),z", 1e3 * TIME, X, Y, X + Y)
+    motion = read_motion(path, (2, 1), rate_hz=500.2)
+    assert (motion.names, motion.rate_hz, motion.path) == (("y (mrad)", "x (urad)"), 500.2, str(path))
+    assert_allclose(motion.samples_rad, np.column_stack([1e-3 * Y, 1e-6 * X]), rtol=1e-9, atol=1e-18)
+    alone = read_motion(path, ("z",), unit="arcsec")
+    assert_allclose(alone.samples_rad[:, 0], np.radians((X + Y) / 3600.0), rtol=1e-9, atol=1e-18)
+    assert read_motion(path, ("x (urad)",), unit="urad").rate_hz == pytest.approx(500.0, rel=1e-6)
+    assert motion.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_gap_of_the_second_axis_is_named_by_its_line_and_counted(tmp_path):
+    np.savez(tmp_path / "a.npz", x=X, y=np.where(np.isin(np.arange(COUNT), (31, 90, 91)), np.inf, Y), fs=500.0)
+    with pytest.raises(RecordingError) as refused:
+        read_motion(tmp_path / "a.npz", unit="urad")
+    assert str(refused.value) == (
+        f"{tmp_path / 'a.npz'}: sample 31 of channel 1 ('y') is inf, 3 such samples in all; cut out a part without "
+        "them: what is filled in was not measured."
+    )
+
+
+def test_of_a_file_with_many_channels_ten_are_listed(tmp_path):
+    np.savez(tmp_path / "a.npz", **{f"c{k}": X for k in range(12)}, fs=500.0)
+    listed = ", ".join(f"'c{k}'" for k in range(10))
+    with pytest.raises(RecordingError) as refused:
+        read_motion(tmp_path / "a.npz", unit="urad")
+    assert str(refused.value) == (
+        f"{tmp_path / 'a.npz'}: 12 channels ({listed}) as axes; name one to three that differ (--axes, axes)."
+    )
+    with pytest.raises(RecordingError) as refused:
+        read_signal(tmp_path / "a.npz")
+    assert str(refused.value) == (
+        f"{tmp_path / 'a.npz'}: the file has 12 channels beside its time ({listed}); name the one."
+    )
+
+
+def test_a_signal_has_the_rate_and_the_unit_of_its_own_channel(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["one/p"], file["two/p [mW]"] = X, Y[:30]
+        file["one"].attrs["fs"], file["two"].attrs["dt"] = 40.0, 0.005
+        file["one/p"].attrs["units"] = " W "
+    first, second = read_signal(path, "one/p"), read_signal(path, "p [mW]")
+    assert (first.name, first.unit, first.rate_hz, first.samples.size) == ("one/p", "W", 40.0, COUNT)
+    assert (second.name, second.unit, second.rate_hz, second.samples.size) == ("two/p [mW]", "mW", 200.0, 30)
+    assert_allclose(second.samples, Y[:30])
+    assert not second.samples.flags.writeable and first.path == str(path)
+    with pytest.raises(
+        RecordingError, match=r"two sample rates: 41 Hz .given. and 40 Hz .one/fs = 40 Hz., 0.9756 times"
+    ):
+        read_signal(path, "one/p", 41.0)
