@@ -365,3 +365,162 @@ def test_what_a_refusal_says_would_do_does(rate_hz, fewest):
     assert taken(1.0, 0.6 * rate_hz, 2.0, replace(limits, rate_hz=parse_quantity(rate, "Hz"))).samples > fast.samples
     (least,) = refused(rate_hz / 7e7, 10.0, 2.0)
     assert taken(rate_hz / 7e7, 10.0, parse_quantity(least, "s")).samples > fast.samples
+
+
+# ---- two inputs and a rate with digits: every number unlike the others
+ODD = Limits(rate_hz=622.08, drive_min_v=-3.5, drive_max_v=9.25, slew_v_s=700.0, samples_per_period=4.5, inputs=2)
+
+
+def test_a_chirp_on_the_second_of_two_inputs_is_its_formula():
+    made = logarithmic_chirp(
+        ODD, start_hz=0.7, stop_hz=33.0, duration_s=3.3, amplitude_v=1.7, offset_v=2.25, axis=1, name="c"
+    )
+    time_s = np.arange(round(3.3 * 622.08)) / 622.08
+    phase = 2 * math.pi * 0.7 * 3.3 / math.log(33 / 0.7) * ((33 / 0.7) ** (time_s / 3.3) - 1)
+    np.testing.assert_allclose(made.drive[:, 1], 2.25 + 1.7 * np.sin(phase), atol=1e-12)
+    np.testing.assert_array_equal(made.drive[:, 0], 2.25)
+    assert (made.name, made.rate_hz, made.rest_v, made.period_samples) == ("c", 622.08, 2.25, None)
+    assert (made.lines, made.step_samples, made.samples) == ((), (), 2053)
+
+
+def test_sines_on_the_second_of_two_inputs_are_their_formula():
+    made = growing_sines(ODD, freq_hz=24.8832, amplitudes_v=[0.5, 1.25, 3.0], periods=3, offset_v=1.5, axis=1, name="s")
+    expected = np.concatenate([a * np.sin(2 * math.pi * np.arange(75) / 25) for a in (0.5, 1.25, 3.0)]) + 1.5
+    np.testing.assert_allclose(made.drive[:, 1], expected, atol=1e-12)
+    np.testing.assert_array_equal(made.drive[:, 0], 1.5)
+    assert (made.name, made.rest_v, made.period_samples, made.samples) == ("s", 1.5, None, 225)
+
+
+@pytest.mark.parametrize(
+    ("freq_hz", "periods", "period"),
+    [(24.8832, 1, None), (24.8832, 2, 25), (49.7664, 6, 25), (46.656, 3, None), (24.8832, 5, 25)],
+)
+def test_sines_of_one_amplitude_have_the_least_whole_number_of_samples_as_period(freq_hz, periods, period):
+    made = growing_sines(ODD, freq_hz=freq_hz, amplitudes_v=[1.0], periods=periods, offset_v=1.5)
+    assert made.period_samples == period
+    if period:
+        np.testing.assert_allclose(made.drive[period:], made.drive[:-period], atol=1e-12)
+
+
+def test_a_staircase_on_the_second_of_two_inputs_goes_down_and_up_in_its_own_times():
+    made = staircase(ODD, levels_v=[2.0, -1.0, 5.0], dwell_s=5 / 622.08, rise_s=8 / 622.08, axis=1, name="steps")
+    down, up = np.linspace(2.0, -1.0, 9)[1:], np.linspace(-1.0, 5.0, 9)[1:]
+    expected = np.concatenate([[2.0] * 6, down, [-1.0] * 5, up, [5.0] * 5])
+    np.testing.assert_allclose(made.drive[:, 1], expected, atol=1e-12)
+    np.testing.assert_array_equal(made.drive[:, 0], 2.0)
+    assert (made.name, made.rest_v, made.step_samples, made.period_samples) == ("steps", 2.0, (13, 26), None)
+
+
+def test_multisines_of_two_inputs_are_sums_of_their_lines_turned_from_realisation_to_realisation():
+    made = multisine(
+        ODD,
+        Lines(625 / 622.08, 3.0, 9.0, "odd"),
+        rms_v=0.8,
+        offset_v=2.5,
+        periods=3,
+        realisations=4,
+        seed=11,
+        name="m",
+    )
+    assert [each.name for each in made] == ["m-1", "m-2", "m-3", "m-4"]
+    assert {(each.period_samples, each.lines, each.samples, each.rest_v) for each in made} == {
+        (625, (5, 7, 9), 1875, 2.5)
+    }
+    lines = []
+    for each in made:
+        np.testing.assert_allclose(each.drive[1250:], each.drive[:625], atol=1e-12)
+        moved = each.drive[:625] - 2.5
+        np.testing.assert_allclose(np.sqrt(np.mean(moved**2, axis=0)), 0.8, rtol=1e-9)
+        found = np.fft.rfft(moved, axis=0)[[5, 7, 9]] * 2 / 625
+        np.testing.assert_allclose(np.abs(found), 0.8 * math.sqrt(2 / 3), rtol=1e-9)
+        assert np.abs(moved[0]).max() == np.abs(moved).max(axis=1).min()
+        lines.append(found[:, 1] / found[:, 0])
+    np.testing.assert_allclose(lines[1], -lines[0], atol=1e-9)
+    np.testing.assert_allclose(lines[3], -lines[2], atol=1e-9)
+    assert np.abs(lines[2] - lines[0]).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("design", "message"),
+    [
+        (
+            lambda: chirp(ODD, offset_v=-4.0, stop_hz=200.0, amplitude_v=0.01),
+            "chirp: stop reaches 200 Hz, 3.11 samples a period at 622.1 Hz where limits.samples_per_period asks for "
+            "4.5; would fit: at most 138.2 Hz, or a rate of at least 900 Hz; offset has -4 V, outside "
+            "limits.drive_min to limits.drive_max; would fit: -3.5 V to 9.25 V",
+        ),
+        (
+            lambda: chirp(ODD, start_hz=33.0, stop_hz=33.0),
+            "chirp: stop is not above start; would fit: a frequency above 33 Hz",
+        ),
+        (
+            lambda: chirp(ODD, start_hz=0.002, duration_s=0.4),
+            "chirp: duration holds less than a thousandth of a period of 2 mHz; would fit: at least 500 ms, or a "
+            "higher start",
+        ),
+        (
+            lambda: chirp(replace(ODD, rate_hz=640.0), duration_s=2e4),
+            "chirp: duration makes a record of 20000 s at 640 Hz; would fit: at most 15620 s (20 million samples), or "
+            "a lower rate",
+        ),
+        (
+            lambda: chirp(ODD, axis=2, amplitude_v=0.1, stop_hz=20.0),
+            "chirp: axis is 3, but the bench has 2 inputs; would fit: 1 to 2",
+        ),
+        (
+            lambda: sines(ODD, freq_hz=25.0, periods=3),
+            "sines: periods of 25 Hz: 3 of them fill 74.6496 samples, no whole number; would fit: a multiple of 625, or "
+            "a frequency of 24.8832 Hz",
+        ),
+        (
+            lambda: sines(ODD, freq_hz=46.656, periods=2),
+            "sines: periods of 46.66 Hz: 2 of them fill 26.6667 samples, no whole number; would fit: a multiple of 3, "
+            "or a frequency of 46.08 Hz",
+        ),
+        (
+            lambda: steps(ODD, levels_v=[1.0, 9.5, -6.0, 2.0], dwell_s=0.1, rise_s=0.02),
+            "staircase: levels has 9.5 V, outside limits.drive_min to limits.drive_max; would fit: -3.5 V to 9.25 V; "
+            "rise makes the largest step one of 803.5 V/s, limits.slew is 700 V/s; would fit: at least 22.5051 ms",
+        ),
+        (
+            lambda: steps(ODD, levels_v=[1.0, 2.0], dwell_s=7e-4),
+            "staircase: dwell is shorter than half a sample; would fit: at least 1.608 ms",
+        ),
+        (
+            lambda: tones(ODD, lines=Lines(1.0, 3.0, 9.0)),
+            "multisine: period is 622.08 samples, no whole number of at least 2; would fit: 999.871399 ms",
+        ),
+        (
+            lambda: tones(ODD, lines=Lines(625 / 622.08, 3.0, 9.0), realisations=5),
+            "multisine: realisations is 5, no multiple of the 2 inputs, so no orthogonal set; would fit: a multiple of "
+            "2",
+        ),
+        (
+            lambda: tones(ODD, lines=Lines(625 / 622.08, 4.1, 4.8, "odd-random"), realisations=2),
+            "multisine: stop leaves no odd-random line of a multisine with one every 995.3 mHz; would fit: a wider "
+            "band, or a longer period",
+        ),
+        (
+            lambda: tones(ODD, lines=Lines(625 / 622.08, 3.0, 312.0), realisations=2),
+            "multisine: stop reaches 311.5 Hz, 2 samples a period at 622.1 Hz where limits.samples_per_period asks "
+            "for 4.5; would fit: at most 138.2 Hz, or a rate of at least 1.402 kHz",
+        ),
+    ],
+)
+def test_a_design_of_two_inputs_is_refused_in_all_words(design, message):
+    with pytest.raises(DesignError) as refused:
+        design()
+    assert str(refused.value) == message
+
+
+def test_a_size_beyond_three_limits_is_refused_with_what_fits_all_of_them():
+    with pytest.raises(DesignError) as refused:
+        chirp(ODD, amplitude_v=8.0, offset_v=2.25, stop_hz=33.0)
+    shape = np.sin(2 * math.pi / math.log(33.0) * (33.0 ** (np.arange(622) / 622.08) - 1))
+    slew = np.abs(np.diff(shape)).max() * 622.08
+    most = f"would fit: at most {math.floor(700e3 / slew) / 1e3:g} V"
+    assert str(refused.value) == (
+        f"chirp: amplitude takes the drive to 10.25 V, limits.drive_max is 9.25 V; {most}; amplitude takes the drive to "
+        f"-5.75 V, limits.drive_min is -3.5 V; {most}; amplitude takes the drive to {8e-3 * slew:.4g} kV/s, limits.slew "
+        f"is 700 V/s; {most}"
+    )
