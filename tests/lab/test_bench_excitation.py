@@ -469,8 +469,8 @@ def test_multisines_of_two_inputs_are_sums_of_their_lines_turned_from_realisatio
         ),
         (
             lambda: sines(ODD, freq_hz=25.0, periods=3),
-            "sines: periods of 25 Hz: 3 of them fill 74.6496 samples, no whole number; would fit: a multiple of 625, or "
-            "a frequency of 24.8832 Hz",
+            "sines: periods of 25 Hz: 3 of them fill 74.6496 samples, no whole number; would fit: a multiple of 625, "
+            "or a frequency of 24.8832 Hz",
         ),
         (
             lambda: sines(ODD, freq_hz=46.656, periods=2),
@@ -520,7 +520,7 @@ def test_a_size_beyond_three_limits_is_refused_with_what_fits_all_of_them():
     slew = np.abs(np.diff(shape)).max() * 622.08
     most = f"would fit: at most {math.floor(700e3 / slew) / 1e3:g} V"
     assert str(refused.value) == (
-        f"chirp: amplitude takes the drive to 10.25 V, limits.drive_max is 9.25 V; {most}; amplitude takes the drive to "
-        f"-5.75 V, limits.drive_min is -3.5 V; {most}; amplitude takes the drive to {8e-3 * slew:.4g} kV/s, limits.slew "
-        f"is 700 V/s; {most}"
+        f"chirp: amplitude takes the drive to 10.25 V, limits.drive_max is 9.25 V; {most}; amplitude takes the drive "
+        f"to -5.75 V, limits.drive_min is -3.5 V; {most}; amplitude takes the drive to {8e-3 * slew:.4g} kV/s, "
+        f"limits.slew is 700 V/s; {most}"
     )

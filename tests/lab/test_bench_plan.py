@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import re
 import tomllib
+import zlib
 from pathlib import Path
 from typing import get_args
 
@@ -403,3 +404,217 @@ def test_a_plan_may_have_as_many_excitations_as_it_may_and_no_more(monkeypatch):
     with pytest.raises(PlanError, match=f"has {there} tables") as caught:
         load_plan("mirror-characterisation")
     assert f"at most {there - 1}" in str(caught.value)
+
+
+# ---- a plan of two axes with numbers all unlike
+TWO_AXES = """
+name = "two axes"
+formats = ["npz", "csv"]
+[limits]
+rate = "622.08 Hz"
+drive_min = "-3 V"
+drive_max = "9 V"
+slew = "700 V/s"
+samples_per_period = 4.5
+[bench]
+truth = "linear"
+axes = 2
+crosstalk = -0.25
+[bench.amplifier]
+gain = 12.5
+output_min = "-50 V"
+output_max = "125 V"
+bandwidth = "4 kHz"
+slew = "0.5 V/us"
+[bench.converters]
+bits = 14
+drive_min = "-3.5 V"
+drive_max = "9.5 V"
+output_min = "-2 mrad"
+output_max = "3 mrad"
+[bench.sensor]
+noise_share = 0.02
+mains = "3 urad"
+mains_frequency = "60 Hz"
+drift = "7 nrad/s"
+[excitation.c]
+kind = "chirp"
+start = "0.7 Hz"
+stop = "33 Hz"
+duration = "1.1 s"
+amplitude = "1.5 V"
+offset = "2.25 V"
+axis = 2
+use = "validation"
+noise_share = 0.05
+[excitation.m]
+kind = "multisine"
+lines = "all"
+start = "3 Hz"
+stop = "9 Hz"
+period = "1 s"
+rms = "0.5 V"
+offset = "2.5 V"
+periods = 2
+realisations = 2
+seed = 5
+rate = "500 Hz"
+[excitation.s]
+kind = "sines"
+frequencies = ["12.4416 Hz", "24.8832 Hz"]
+amplitudes = ["0.5 V", "1.25 V"]
+periods = 3
+offset = "1.5 V"
+axis = 2
+truth = "bouc-wen"
+[excitation.t]
+kind = "staircase"
+levels = ["2 V", "-1 V", "5 V"]
+dwell = "0.1 s"
+rise = "20 ms"
+truth = "bench"
+"""
+
+
+def test_each_record_of_a_plan_of_two_axes_has_what_is_its_own(tmp_path):
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_AXES, encoding="utf-8")
+    found = load_plan(path)
+    assert (found.name, found.formats, found.path) == ("two axes", ("npz", "csv"), path)
+    assert found.sha256 == hashlib.sha256(TWO_AXES.encode()).hexdigest() and found.text == TWO_AXES
+    told = [(r.excitation.name, r.kind, r.use, r.truth, r.noise_share, r.excitation.rate_hz) for r in found.records]
+    assert told == [
+        ("c", "chirp", "validation", "linear", 0.05, 622.08),
+        ("m-1", "multisine", "identification", "linear", None, 500.0),
+        ("m-2", "multisine", "identification", "linear", None, 500.0),
+        ("s-12.4416hz", "sines", "identification", "bouc-wen", None, 622.08),
+        ("s-24.8832hz", "sines", "identification", "bouc-wen", None, 622.08),
+        ("t", "staircase", "identification", "bench", None, 622.08),
+    ]
+    moved = [np.ptp(record.excitation.drive, axis=0) > 0.0 for record in found.records]
+    assert [each.tolist() for each in moved] == [
+        *([False, True], [True, True], [True, True]),
+        *([False, True], [False, True], [True, False]),
+    ]
+    assert [record.excitation.rest_v for record in found.records] == [2.25, 2.5, 2.5, 1.5, 1.5, 2.0]
+    assert [record.excitation.samples for record in found.records] == [684, 1000, 1000, 300, 150, 211]
+    assert [record.stream for record in found.records] == [zlib.crc32(each[0].encode()) for each in told]
+    kept = bench.select_records(found, ["t", "m-2"])
+    assert [record.excitation.name for record in kept.records] == ["m-2", "t"]
+    with pytest.raises(ValueError) as refused:
+        bench.select_records(found, ["t", "m", "x"])
+    assert str(refused.value) == (
+        f"{path}: no record is named 'm'; the plan has c, m-1, m-2, s-12.4416hz, s-24.8832hz, t."
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "faults"),
+    [
+        (
+            [('drive_min = "-3 V"', 'drive_min = "-4.5 V"'), ('drive_max = "9 V"', 'drive_max = "11 V"')],
+            [
+                (
+                    "limits.drive_min",
+                    "is below the range of the converters, -3.5 V to 9.5 V at the drive",
+                    "within -3.5 V to 9.5 V",
+                ),
+                (
+                    "limits.drive_min",
+                    "is below the range of the amplifier, -4 V to 10 V at the drive",
+                    "within -4 V to 10 V",
+                ),
+                (
+                    "limits.drive_max",
+                    "is above the range of the converters, -3.5 V to 9.5 V at the drive",
+                    "within -3.5 V to 9.5 V",
+                ),
+                (
+                    "limits.drive_max",
+                    "is above the range of the amplifier, -4 V to 10 V at the drive",
+                    "within -4 V to 10 V",
+                ),
+            ],
+        ),
+        (
+            [('drive_max = "9.5 V"', 'drive_max = "-3.5 V"'), ('output_max = "3 mrad"', 'output_max = "-2.5 mrad"')],
+            [
+                ("bench.converters.drive_max", "is not above drive_min", "above -3.5 V"),
+                ("bench.converters.output_max", "is not above output_min", "above -2 mrad"),
+            ],
+        ),
+        (
+            [('drive_max = "9 V"', 'drive_max = "-3 V"')],
+            [("limits.drive_max", "is not above drive_min (-3 V)", "a voltage above -3 V")],
+        ),
+        (
+            [("noise_share = 0.02", 'noise_share = 0.02\nnoise = "2 urad"')],
+            [
+                (
+                    "bench.sensor",
+                    "noise and noise_share are both given",
+                    'one of them: noise = "1 urad" or noise_share = 0.03',
+                )
+            ],
+        ),
+        (
+            [("noise_share = 0.02", "")],
+            [
+                (
+                    "bench.sensor",
+                    "noise and noise_share are both missing",
+                    'one of them: noise = "1 urad" or noise_share = 0.03',
+                )
+            ],
+        ),
+        (
+            [('formats = ["npz", "csv"]', 'formats = ["npz", "csv", "npz"]')],
+            [
+                (
+                    "formats",
+                    "is no list of different file formats",
+                    'a list with some of csv, lvm, tdms, mat, mat73, npz, hdf5; for example formats = ["csv"]',
+                )
+            ],
+        ),
+        (
+            [("axis = 2\nuse", "axis = 3\nuse"), ("realisations = 2", "realisations = 3")],
+            [
+                ("excitation.c.axis", "is 3, but the bench has 2 inputs", "1 to 2"),
+                (
+                    "excitation.m.realisations",
+                    "is 3, no multiple of the 2 inputs, so no orthogonal set",
+                    "a multiple of 2",
+                ),
+            ],
+        ),
+        (
+            [('kind = "staircase"', 'kind = "stairs"'), ('truth = "bench"', 'truth = "table"')],
+            [
+                (
+                    "excitation.t.kind",
+                    "is none of the choices",
+                    'kind = "chirp" or kind = "multisine" or kind = "sines" or kind = "staircase"',
+                )
+            ],
+        ),
+    ],
+)
+def test_faults_of_a_plan_of_two_axes_are_told_in_all_words(refuse, changes, faults):
+    text = TWO_AXES
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    told = [(fault.key, fault.reason, fault.expected) for fault in refuse(text).faults]
+    assert told == faults
+
+
+def test_a_record_beyond_the_limits_of_a_plan_of_two_axes_stands_on_its_own_line(refuse):
+    text = TWO_AXES.replace('levels = ["2 V", "-1 V", "5 V"]', 'levels = ["2 V", "-3.25 V", "5 V"]')
+    (fault,) = refuse(text).faults
+    assert (fault.key, fault.reason, fault.expected) == (
+        "excitation.t.levels",
+        "has -3.25 V, outside limits.drive_min to limits.drive_max",
+        "-3 V to 9 V",
+    )
+    assert fault.line == 1 + text[: text.index("levels =")].count("\n")
