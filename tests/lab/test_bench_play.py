@@ -4,6 +4,7 @@ import errno
 import hashlib
 import json
 import math
+import zlib
 from dataclasses import replace
 
 import h5py
@@ -16,8 +17,10 @@ from nptdms import TdmsFile
 from microrad.core.folder import FolderError
 from microrad.lab.bench import folder as bench_folder
 from microrad.lab.bench import load_plan, play, select_records, write_folder
+from microrad.lab.bench.mirrors import bouc_wen_output, linear_output
 from microrad.lab.bench.plan import FORMATS, PlanError
 from microrad.lab.bench.play import BenchError, _check_range, true_output
+from microrad.lab.recording import read_recording
 
 SEED = 5
 
@@ -395,3 +398,214 @@ def test_a_format_without_its_library_says_what_to_install(short, tmp_path, monk
     with pytest.raises(BenchError, match=r"needs npTDMS, which is not installed: .* constraints.txt '\.\[lab\]'"):
         write_folder(short, tmp_path / "out", SEED)
     assert list(tmp_path.iterdir()) == []
+
+
+# ---- two axes at a rate with digits
+TWO_AXES = """
+name = "two axes"
+formats = ["csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5"]
+[limits]
+rate = "622.08 Hz"
+drive_min = "-3 V"
+drive_max = "9 V"
+slew = "700 V/s"
+samples_per_period = 4.5
+[bench]
+truth = "linear"
+axes = 2
+crosstalk = -0.25
+[bench.amplifier]
+gain = 12.5
+output_min = "-50 V"
+output_max = "125 V"
+bandwidth = "4 kHz"
+slew = "0.5 V/us"
+[bench.converters]
+bits = 14
+drive_min = "-3.5 V"
+drive_max = "9.5 V"
+output_min = "-2 mrad"
+output_max = "3 mrad"
+[bench.sensor]
+noise_share = 0.02
+mains = "3 urad"
+mains_frequency = "60 Hz"
+drift = "7 urad/s"
+[excitation.m]
+kind = "multisine"
+lines = "all"
+start = "3 Hz"
+stop = "9 Hz"
+period = "1 s"
+rms = "0.5 V"
+offset = "2.5 V"
+periods = 2
+realisations = 2
+seed = 5
+rate = "500 Hz"
+[excitation.c]
+kind = "chirp"
+start = "0.7 Hz"
+stop = "33 Hz"
+duration = "1.1 s"
+amplitude = "1.5 V"
+offset = "2.25 V"
+axis = 2
+use = "validation"
+noise_share = 0.05
+truth = "bouc-wen"
+"""
+
+
+@pytest.fixture(scope="module")
+def two_axes(tmp_path_factory):
+    path = tmp_path_factory.mktemp("plan") / "two.toml"
+    path.write_text(TWO_AXES, encoding="utf-8")
+    return load_plan(path)
+
+
+def test_what_the_sensor_adds_is_mains_and_drift_on_all_axes_and_noise_of_each_ones_share(two_axes):
+    for record, recording, share in zip(two_axes.records, play(two_axes, 3), (0.02, 0.02, 0.05), strict=True):
+        drive, angle = true_output(two_axes, record)
+        rate_hz = record.excitation.rate_hz
+        stream = np.random.SeedSequence(3, spawn_key=(zlib.crc32(record.excitation.name.encode()),))
+        rng = np.random.Generator(np.random.Philox(stream))
+        time_s, phase = np.arange(len(angle)) / rate_hz, 2 * math.pi * rng.random()
+        common = 3e-3 * np.sin(2 * math.pi * 60 * time_s + phase) + 7e-3 * time_s
+        measured = angle + common[:, None] + share * angle.std(axis=0) * rng.standard_normal(angle.shape)
+        step = 5.0 / 2**14
+        np.testing.assert_allclose(recording.output, -2.0 + step * np.round((measured + 2.0) / step), atol=1e-9)
+        np.testing.assert_array_equal(recording.drive, drive)
+        codes = (drive + 3.5) / (13.0 / 2**14)
+        np.testing.assert_allclose(codes, np.round(codes), atol=1e-6)
+        assert np.abs(drive - record.excitation.drive).max() <= 6.5 / 2**14 * (1 + 1e-9)
+        assert (recording.input_names, recording.output_names) == (("drive1", "drive2"), ("angle1", "angle2"))
+        assert (recording.input_units, recording.output_units) == (("V", "V"), ("mrad", "mrad"))
+
+
+def test_each_axis_answers_its_own_drive_less_a_quarter_of_the_other(two_axes):
+    record = two_axes.records[1]
+    drive, angle = true_output(two_axes, record)
+    rest_v = -3.5 + 13.0 / 2**14 * np.round((2.5 + 3.5) / (13.0 / 2**14))
+    alone = [linear_output(np.ascontiguousarray(column), rest_v, 500.0) for column in drive.T]
+    np.testing.assert_allclose(angle[:, 0], alone[0] - 0.25 * alone[1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(angle[:, 1], alone[1] - 0.25 * alone[0], rtol=0, atol=1e-12)
+    chirped = true_output(two_axes, two_axes.records[2])[1]
+    own = bouc_wen_output(np.ascontiguousarray(true_output(two_axes, two_axes.records[2])[0][:, 1]), 2.25, 622.08)
+    assert np.ptp(chirped[:, 0]) == pytest.approx(0.25 * np.ptp(chirped[:, 1]), rel=0.05)
+    assert np.ptp(chirped[:, 1]) == pytest.approx(np.ptp(own), rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def two_axes_folder(two_axes, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench") / "two"
+    files = write_folder(two_axes, folder, 3)
+    suffixes = (".csv", ".lvm", ".tdms", ".mat", "-v73.mat", ".npz", ".h5")
+    assert [path.name for path in files] == [f"{name}{each}" for name in ("m-1", "m-2", "c") for each in suffixes]
+    return folder
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".lvm", ".tdms", ".mat", "-v73.mat", ".npz", ".h5"])
+def test_each_file_of_two_axes_is_read_as_it_was_played(two_axes, two_axes_folder, suffix):
+    for played in play(two_axes, 3)[1:]:
+        path = two_axes_folder / f"{played.path}{suffix}"
+        found = read_recording(path, ("drive2", "drive1"), ("angle2", "angle1"), accept=("lead",), alone=False)
+        atol = 1e-8 if suffix in (".csv", ".lvm") else 0.0
+        np.testing.assert_allclose(found.drive, played.drive[:, ::-1], rtol=0, atol=atol)
+        np.testing.assert_allclose(found.output, played.output[:, ::-1], rtol=0, atol=atol)
+        assert found.rate_hz == pytest.approx(played.rate_hz, rel=1e-7)
+        if suffix in (".csv", ".lvm", ".tdms", ".h5"):
+            assert (found.input_units, found.output_units) == (("V", "V"), ("mrad", "mrad"))
+
+
+def test_the_texts_of_two_axes_have_their_heads_and_times_line_by_line(two_axes, two_axes_folder):
+    played = play(two_axes, 3)[2]
+    lines = (two_axes_folder / "c.csv").read_text(encoding="utf-8").split("\n")
+    assert lines[:2] == ["time,drive1,drive2,angle1,angle2", "s,V,V,mrad,mrad"]
+    values = [*played.drive[3], *played.output[3]]
+    assert lines[5] == f"{3 / 622.08:.7f}," + ",".join(f"{value:.9g}" for value in values)
+    assert (len(lines), lines[-1]) == (played.samples + 3, "")
+    head, _, rest = (two_axes_folder / "c.lvm").read_text(encoding="utf-8").partition("***End_of_Header***\t\n\t\n")
+    assert head.split("\n") == [
+        *("LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab", "Decimal_Separator\t."),
+        *("Multi_Headings\tNo", "X_Columns\tOne", "Time_Pref\tRelative", "Date\t1904/01/01", "Time\t00:00:00", ""),
+    ]
+    assert rest.split("\n")[:10] == [
+        "Channels\t4",
+        "Samples" + "\t684" * 4,
+        "Date" + "\t1904/01/01" * 4,
+        "Time" + "\t00:00:00" * 4,
+        "Y_Unit_Label\tV\tV\tmrad\tmrad",
+        "X_Dimension" + "\tTime" * 4,
+        "X0" + "\t0.0" * 4,
+        "Delta_X" + f"\t{1 / 622.08:.15g}" * 4,
+        "***End_of_Header***\t",
+        "X_Value\tdrive1\tdrive2\tangle1\tangle2",
+    ]
+    assert rest.split("\n")[13] == lines[5].replace(",", "\t")
+
+
+def test_the_manifest_of_two_axes_has_each_record_in_full(two_axes, two_axes_folder):
+    manifest = json.loads((two_axes_folder / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["plan"] == {
+        "name": "two axes",
+        "file": "plan.toml",
+        "source": "two.toml",
+        "sha256": hashlib.sha256(TWO_AXES.encode()).hexdigest(),
+    }
+    assert (manifest["seed"], manifest["drive_unit"], manifest["output_unit"]) == (3, "V", "mrad")
+    suffixes = (".csv", ".lvm", ".tdms", ".mat", "-v73.mat", ".npz", ".h5")
+    channels = {"inputs": ["drive1", "drive2"], "outputs": ["angle1", "angle2"], "step_samples": []}
+    lined = {"period_samples": 500, "rest_v": 2.5, "lines": list(range(3, 10)), "rate_hz": 500.0, "samples": 1000}
+    swept = {"period_samples": None, "rest_v": 2.25, "lines": [], "rate_hz": 622.08, "samples": 684}
+    assert manifest["records"] == [
+        {
+            **{"name": name, "kind": kind, "use": use, "truth": truth},
+            **{"files": [f"{name}{suffix}" for suffix in suffixes], **channels, **own},
+        }
+        for name, kind, use, truth, own in (
+            ("m-1", "multisine", "identification", "linear", lined),
+            ("m-2", "multisine", "identification", "linear", lined),
+            ("c", "chirp", "validation", "bouc-wen", swept),
+        )
+    ]
+    assert list(manifest["versions"]) == ["python", "microrad", "numpy", "scipy", "numba"]
+    assert manifest["files_sha256"] == {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(two_axes_folder.iterdir())
+        if path.name != "manifest.json"
+    }
+
+
+def test_a_folder_of_two_axes_is_read_with_uses_and_periods_from_its_first_format(two_axes, two_axes_folder):
+    found = bench_folder.read_folder(two_axes_folder, ("lead",))
+    assert [use for _, use in found] == ["identification", "identification", "validation"]
+    assert [each.path for each, _ in found] == [str(two_axes_folder / f"{name}.csv") for name in ("m-1", "m-2", "c")]
+    assert [each.period_samples for each, _ in found] == [500, 500, None]
+    assert {each.output_names for each, _ in found} == {("angle1", "angle2")}
+
+
+@pytest.mark.parametrize(
+    "text", [None, "{", "[]", "{}", '{"records": 3}', '{"records": [{}]}', '{"records": [{"files": []}]}']
+)
+def test_a_folder_without_a_whole_manifest_is_none_of_a_bench(tmp_path, text):
+    if text is not None:
+        (tmp_path / "manifest.json").write_text(text, encoding="utf-8")
+    with pytest.raises(BenchError) as refused:
+        bench_folder.read_folder(tmp_path)
+    assert str(refused.value) == (
+        f"{tmp_path}: no manifest.json of microrad bench in it; name the recordings themselves (--input, --output)"
+    )
+
+
+def test_a_mirror_that_moves_beyond_its_converter_is_told_with_both_ranges(two_axes):
+    measured = np.array([[0.5, -2.25], [3.5, 1.0]])
+    with pytest.raises(BenchError) as refused:
+        _check_range(two_axes, two_axes.records[2], measured)
+    assert str(refused.value) == (
+        f"{two_axes.path}: excitation 'c' moves the mirror over -2.25 mrad to 3.5 mrad, but bench.converters take in "
+        "-2 mrad to 3 mrad; widen output_min and output_max, or drive less"
+    )
+    with pytest.raises(BenchError) as refused:
+        play(two_axes, -2)
+    assert str(refused.value) == "the seed is -2; give a whole number of at least 0"
