@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from microrad.lab.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
+from microrad.lab.recording.formats.text import TextSource
 
 N = 400
 TIME = np.arange(N) / 100.0
@@ -328,3 +329,216 @@ def test_arrays_that_are_no_real_numbers_are_refused(drive):
 def test_rates_that_no_converter_has_are_refused(rate_hz):
     with pytest.raises(RecordingError, match="give the samples per second"):
         recording_from_arrays(DRIVE, OUTPUT, rate_hz)
+
+
+# ---- small texts: what their layout is, what is read of them, and what is said of what cannot be read
+@pytest.mark.parametrize(
+    ("text", "delimiter", "headers", "first", "units", "last"),
+    [
+        (
+            "a;b;c\n(V);[mm];s\n1.5;2;-3\n4;5e-1;6\n",
+            ";",
+            (("a", "b", "c"), ("(V)", "[mm]", "s")),
+            3,
+            ("V", "mm", "s"),
+            [4, 0.5, 6],
+        ),
+        (
+            "% by hand\n# x;y;z\n#V;mV;s\n\n1;2;3\n",
+            ";",
+            (("x", "y", "z"), ("V", "mV", "s")),
+            5,
+            ("V", "mV", "s"),
+            [1, 2, 3],
+        ),
+        ("x\ty\nfoo\tbar\n1\t2\n3\t4", "\t", (("x", "y"), ("foo", "bar")), 3, ("", ""), [3, 4]),
+        ('"a;1";b [mm];"c (V)"\n"1";2;3\n', ";", (("a;1", "b [mm]", "c (V)"),), 2, ("", "mm", "V"), [1, 2, 3]),
+        ("s;m\nu;y\n1;2\n", ";", (("u", "y"), ("s", "m")), 3, ("s", "m"), [1, 2]),
+        ("u,y\n-,%\n1,-.5\n", ",", (("u", "y"), ("-", "%")), 3, ("-", "%"), [1, -0.5]),
+        ("u,y\n,V\n\n1,+2\n", ",", (("u", "y"), ("", "V")), 4, ("", "V"), [1, 2]),
+        ("  1   2 3 \n 4 5  6\n", None, (), 1, ("", "", ""), [4, 5, 6]),
+        ("note\nu y\n1 2\n# a remark\n  3 4\n", None, (("u", "y"),), 3, ("", ""), [3, 4]),
+        ("run 7\nu,y,z\n7,x,1\n2,3,4\n", ",", (("u", "y", "z"),), 3, ("", "", ""), None),
+    ],
+)
+def test_the_layout_of_a_text_is_judged_by_its_lines(tmp_path, text, delimiter, headers, first, units, last):
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    source = TextSource(path)
+    layout = source.layout
+    assert (layout.delimiter, layout.headers, layout.first_line, layout.encoding) == (
+        *(delimiter, headers, first),
+        "utf-8-sig",
+    )
+    assert source.units == units and layout.columns == len(units)
+    assert source.names == (headers[0] if headers else tuple(str(k) for k in range(len(units))))
+    if last is not None:
+        order = list(range(len(last)))[::-1]
+        assert [column[-1] for column in source.load(order)] == last[::-1]
+    assert source.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "words"),
+    [
+        (
+            "1,5 2,5\n3,5 4,5\n",
+            0,
+            "line 1, column 0: '1,5' has a decimal comma; export with decimal points, so that it reads '1.5'.",
+        ),
+        (
+            "u;y\n1;2\n3;-4,5E-3\n",
+            1,
+            "line 3, column 1 ('y'): '-4,5E-3' has a decimal comma; export with decimal points, so that it reads "
+            "'-4.5E-3'.",
+        ),
+        (
+            "u\ty\n1\t2\n\n# x\n3\n5\t6\n",
+            1,
+            "line 5 has 1 cell where 2 are expected, separated by tab ('3'); repair or remove the line.",
+        ),
+        (
+            "u;y\n1;2\n3;4;5\n6;7\n",
+            0,
+            "line 3 has 3 cells where 2 are expected, separated by semicolon ('3;4;5'); repair or remove the line.",
+        ),
+        (
+            "u y\n1 2\n3 4 5\n5 6\n",
+            1,
+            "line 3 has 3 cells where 2 are expected, separated by white space ('3 4 5'); repair or remove the line.",
+        ),
+        (
+            "u,y\n1,2\n3,1_0\n",
+            1,
+            "line 3, column 1 ('y'): '1_0' is not a number; repair the cell, or start the line with # if it is a "
+            "remark.",
+        ),
+        (
+            "u,y\n1,2\n3," + "q" * 60 + "\n",
+            1,
+            f"line 3, column 1 ('y'): '{'q' * 39}…' is not a number; repair the cell, or start the line with # if it "
+            "is a remark.",
+        ),
+        (
+            "u,y\n1,2\n,4\n",
+            0,
+            "line 3, column 0 ('u'): the cell is empty; fill the gap or cut the recording there.",
+        ),
+        (
+            "u,y\n1,2\n3,-inf\n",
+            1,
+            "line 3, column 1 ('y'): '-inf' is not a finite number; a gap or an overflow of the sensor must be cut out "
+            "or repaired, because hysteresis remembers what happened in it.",
+        ),
+        (
+            "u,y\n1,5,2,5\n3,5,4,5\n",
+            1,
+            "the header names 2 columns and the rows have 4: decimal commas, which cannot be told from separating "
+            "commas here; export with decimal points.",
+        ),
+        (
+            "power\n1\n2\n",
+            0,
+            "only one column was found (line 2: '1'); drive and output must stand side by side, separated by comma, "
+            "semicolon, tab or white space.",
+        ),
+        (
+            "a\nb\nc\n",
+            0,
+            "no row of numbers was found; the first line reads 'a'. Export the recording as text with one row of "
+            "numbers per sample.",
+        ),
+        (
+            "# a\n\n% b\n",
+            0,
+            "the file holds only blank lines and comments; export the recording as rows of numbers, one per sample.",
+        ),
+    ],
+)
+def test_a_line_of_a_text_that_is_wrong_is_told_in_all_words(tmp_path, text, column, words):
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RecordingError) as caught:
+        TextSource(path).load([column])
+    assert str(caught.value) == f"{path}: {words}"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found"),
+    [
+        ("a", 0),
+        ("c", 3),
+        ("2", 2),
+        ("V", 1),
+        ("b", "columns 1, 2 are all named 'b'; give the sensor column by its number, counted from 0."),
+        (
+            "C",
+            "no sensor column is named 'C'; the nearest is 'c'. The columns are 'a', 'b', 'b', 'c'; a number counted "
+            "from 0 does as well.",
+        ),
+        (
+            True,
+            "there is no sensor column True: the file has 4 columns, numbered from 0 to 3 (semicolon between them).",
+        ),
+        ("4", "there is no sensor column 4: the file has 4 columns, numbered from 0 to 3 (semicolon between them)."),
+        (-1, "there is no sensor column -1: the file has 4 columns, numbered from 0 to 3 (semicolon between them)."),
+    ],
+)
+def test_a_column_is_found_by_a_name_in_any_head_or_by_its_number(tmp_path, wanted, found):
+    path = tmp_path / "a.csv"
+    path.write_text("a;b;b;c\ns;V;mm;um\n1;2;3;4\n", encoding="utf-8")
+    if isinstance(found, int):
+        assert TextSource(path).resolve(wanted, "sensor") == found
+        return
+    with pytest.raises(RecordingError) as caught:
+        TextSource(path).resolve(wanted, "sensor")
+    assert str(caught.value) == f"{path}: {found}"
+
+
+def test_a_single_column_may_have_several_words_as_its_name(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("power of it\n1\n2.5\n", encoding="utf-8")
+    source = TextSource(path, alone=True)
+    assert (source.names, source.layout.delimiter, source.load([0])[0].tolist()) == (("power of it",), ",", [1, 2.5])
+
+
+def test_a_text_in_latin_1_and_of_old_ends_of_lines_is_read_with_its_units(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes("drive,angle\rV,µrad\r1,2\r3,4\r".encode("latin-1"))
+    source = TextSource(path)
+    assert (source.layout.encoding, source.units, source.layout.first_line) == ("latin-1", ("V", "µrad"), 3)
+    assert [column.tolist() for column in source.load([1, 0])] == [[2, 4], [1, 3]]
+    assert [source.place(row) for row in (0, 1, 2)] == ["line 3", "line 4", "the end"]
+
+
+def test_a_file_of_too_many_bytes_is_told_with_both_sizes(tmp_path, monkeypatch):
+    path = write(tmp_path / "a.csv", ROWS)
+    monkeypatch.setattr(files, "MAX_BYTES", 3000)
+    assert refusal(path) == (
+        f"{path}: the file has {path.stat().st_size / 1e9:.1f} GB and at most 0 GB are read, because the columns are "
+        "held in memory; cut out the part you need or keep every n-th sample."
+    )
+
+
+def test_arrays_of_several_channels_have_names_and_numbers_of_their_own():
+    drive = np.column_stack((DRIVE, np.cos(1.7 * TIME)))
+    output = np.column_stack((OUTPUT, drive @ [0.3, 1], TIME + drive[:, 1]))
+    made = recording_from_arrays(drive, output, 622.08, "b", 50, accept=["drift"])
+    assert (made.input_names, made.output_names) == (("drive 0", "drive 1"), ("output 0", "output 1", "output 2"))
+    assert (made.path, made.rate_hz, made.period_samples, made.input_units, made.output_units, made.role) == (
+        *("b", 622.08, 50, (), ()),
+        "",
+    )
+    assert made.sha256 == hashlib.sha256(made.drive.tobytes() + made.output.tobytes()).hexdigest()
+    assert not (made.drive.flags.writeable or made.output.flags.writeable)
+    drive[:] = 0.0
+    np.testing.assert_array_equal(made.drive[:, 0], DRIVE)
+    first = made.first(30)
+    assert (first.samples, first.output.shape, first.step_s) == (30, (30, 3), 1 / 622.08)
+    for shapes in (((N, 2), (N - 1, 3)), ((N, 2, 1), (N,)), ((), (N,))):
+        with pytest.raises(RecordingError) as caught:
+            recording_from_arrays(np.ones(shapes[0]), np.ones(shapes[1]), 100.0, "b")
+        assert str(caught.value) == (
+            f"b: drive has shape {shapes[0]} and output {shapes[1]}; give arrays of shape (samples,) or (samples, "
+            "channels) with equally many samples."
+        )
