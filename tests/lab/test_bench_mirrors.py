@@ -8,12 +8,19 @@ import pytest
 from microrad.core import lti
 from microrad.core.kernels import play_response
 from microrad.lab.bench.mirrors import (
+    _SETTLED,
     EQ2_DENOMINATOR,
     EQ2_NUMERATOR,
     EQ3,
     FINE_STEP_S,
     Amplifier,
     BenchMirror,
+    _approach,
+    _MirrorState,
+    _modes,
+    _moving,
+    _straight_line,
+    _stretches,
     bench_output,
     bouc_wen_output,
     linear_output,
@@ -251,3 +258,94 @@ def test_another_mirror_may_stand_in_the_place_of_the_benchs_own():
     assert output[0] == pytest.approx(6.0 * 0.079, rel=1e-9)
     assert output[-1] == pytest.approx(7.0 * 0.079, rel=1e-3)
     assert bench_output(drive, 6.0, RATE_HZ, AMPLIFIER)[0] == pytest.approx(BenchMirror().at_rest(6.0), rel=1e-9)
+
+
+# ---- parts by themselves
+@pytest.mark.parametrize(("value", "command"), [(2.0, 9.5), (9.5, 2.0), (2.0, 2.3), (-1.0, -1.0)])
+def test_an_approach_slews_and_then_decays_as_small_steps_do(value, command):
+    tau, slew = 3e-3, 500.0
+    step_s, at = 1e-5, [value]
+    for _ in range(5000):
+        at.append(at[-1] + step_s * min(max((command - at[-1]) / tau, -slew), slew))
+    marks = np.array([10, 700, 2000, 5000])
+    np.testing.assert_allclose(
+        _approach(value, command, marks * step_s, tau, slew), np.array(at)[marks], rtol=0, atol=5e-3
+    )
+    if abs(command - value) > 1.5:  # the line alone
+        assert _approach(value, command, 1e-3, tau, slew) == pytest.approx(value + math.copysign(0.5, command - value))
+
+
+@pytest.mark.parametrize("pole", [-3.0, -1e-5, -0.9 + 40.0j, -2e3])
+def test_a_step_of_a_line_is_the_integral_of_its_input(pole):
+    """By the midpoint rule: of an input of 1, and of one that rises from 0 to 1."""
+    step_s, count = 0.003, 4000
+    decay, start, end = _straight_line(np.array(pole), step_s)
+    at = (np.arange(count) + 0.5) / count
+    weight = np.exp(pole * step_s * (1 - at)) * step_s / count
+    assert abs(decay - np.exp(pole * step_s)) < 1e-15
+    assert abs(end - np.sum(weight * at)) < 1e-6 * abs(end)
+    assert abs(start - np.sum(weight * (1 - at))) < 1e-6 * abs(start)
+
+
+def test_stretches_of_moving_samples_have_their_ends_and_last_until_all_has_settled():
+    assert _stretches(np.array([True, True, False, False, False, True])) == [(0, 2, True), (2, 5, False), (5, 6, True)]
+    assert _stretches(np.array([False])) == [(0, 1, False)]
+    run = _MirrorState(BenchMirror(), Amplifier(100.0, 50.0), 1.0, 1e-3)
+    drive = np.full(300, 1.0)
+    drive[40:] = 3.5
+    moving = _moving(drive, 1.0, run)
+    settle = math.ceil((_SETTLED / (2 * math.pi * 100.0) + 2.5 / 50.0) / 1e-3)
+    assert np.flatnonzero(moving).tolist() == list(range(40, 40 + settle))
+    slower = _MirrorState(BenchMirror(viscous_smoothing_s=2e-3), Amplifier(100.0, 50.0), 1.0, 1e-3)
+    assert np.count_nonzero(_moving(drive, 1.0, slower)) == math.ceil((_SETTLED * 2e-3 + 2.5 / 50.0) / 1e-3)
+    assert _moving(np.full(5, 1.0), 2.0, run).all() and not _moving(np.full(5, 1.0), 1.0, run).any()
+
+
+def test_a_mirror_of_other_numbers_rests_saturates_and_spreads_by_its_own():
+    mirror = BenchMirror(0.05, 0.03, 4, 6.0, 1.5, 0.02, creep_first_s=0.3, creep_decades=2, lags_per_decade=3)
+    np.testing.assert_allclose(mirror.thresholds_v, [1.5, 3.0, 4.5, 6.0])
+    density = np.array([(0.15 + r) * math.exp(-(r**1.3)) for r in (1.0, 2.0, 3.0, 4.0)])
+    np.testing.assert_allclose(mirror.weights_mrad_v, 0.03 * density / density.sum(), rtol=1e-12)
+    np.testing.assert_allclose(mirror.lag_times_s, 0.3 * 10.0 ** (np.arange(1, 12, 2) / 6), rtol=1e-12)
+    assert mirror.at_rest(5.0) == pytest.approx(0.4 + 0.02 * 0.16, rel=1e-12)
+    np.testing.assert_allclose(mirror.saturated(np.array([-0.5, 2.0])), [-0.495, 2.08], rtol=1e-12)
+    assert Amplifier(40.0, 1.0).time_constant_s == pytest.approx(1 / (80 * math.pi), rel=1e-12)
+
+
+def test_modes_of_a_fraction_are_its_poles_above_the_line_with_residues_of_both():
+    """(3 s + 5) / ((s + 2)(s^2 + 2 s + 17)): a real pole and a pair of -1 + 4i."""
+    poles, residues = _modes((3.0, 5.0), tuple(2.5 * np.poly([-2.0, -1 + 4j, -1 - 4j]).real))
+    order = np.argsort(poles.imag)
+    np.testing.assert_allclose(poles[order], [-2.0, -1 + 4j], rtol=1e-9)
+    pair = 2 * (3 * (-1 + 4j) + 5) / 2.5 / ((-1 + 4j + 2) * 8j)
+    np.testing.assert_allclose(residues[order], [-1 / 2.5 / 17.0, pair], rtol=1e-9)
+
+
+@pytest.mark.parametrize("cut", [1, 7, 60])
+def test_a_record_in_parts_goes_on_where_the_part_before_ended(cut):
+    drive = np.ascontiguousarray(6.0 + 3.0 * np.sin(np.arange(120) / 9.0))
+    amplifier = Amplifier(800.0, 900.0)
+    whole = _MirrorState(BenchMirror(operators=5), amplifier, 6.2, 1e-3)
+    volts = whole.amplified(drive)
+    fast, strain = whole.advance(drive, volts, 4)
+    parts = _MirrorState(BenchMirror(operators=5), amplifier, 6.2, 1e-3)
+    pieces = [parts.advance(drive[a:b], volts[a:b], 4) for a, b in ((0, cut), (cut, 100), (100, 120))]
+    np.testing.assert_allclose(np.concatenate([piece[0] for piece in pieces]), fast, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.concatenate([piece[1] for piece in pieces]), strain, rtol=0, atol=1e-12)
+    assert np.ptp(fast) > 0.01
+
+
+def test_an_amplifier_that_slews_somewhere_goes_from_sample_to_sample():
+    run = _MirrorState(BenchMirror(), Amplifier(30.0, 100.0), 1.0, 1e-3)
+    drive = np.array([4.0, 4.0, 4.0, 1.5, 1.5, 1.5, 1.6])
+    expected, value = [1.0], 1.0
+    for command in drive[:-1]:
+        value = float(_approach(value, command, 1e-3, 1 / (60 * math.pi), 100.0))
+        expected.append(value)
+    np.testing.assert_allclose(run.amplified(drive), expected, rtol=1e-12)
+    quick = _MirrorState(BenchMirror(), Amplifier(30.0, 1e6), 1.0, 1e-3).amplified(drive)
+    share = 1 - math.exp(-0.06 * math.pi)
+    expected = [1.0]
+    for command in drive[:-1]:
+        expected.append(expected[-1] + share * (command - expected[-1]))
+    np.testing.assert_allclose(quick, expected, rtol=1e-12)
