@@ -16,7 +16,7 @@ from microrad.lab.recording import (
 )
 from microrad.lab.recording.checks import channel, sample_rate
 from microrad.lab.recording.checks.channel import _percent, _trend, clipping, drift, quantum
-from microrad.lab.recording.checks.drive_and_output import excitation
+from microrad.lab.recording.checks.drive_and_output import _correlation, _predicts, _response, excitation
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.formats.source import StatedRate
 from places import DATA
@@ -1244,3 +1244,136 @@ def test_recordings_that_do_not_go_together_are_told_by_name_and_number():
         "third: 2 inputs and 2 outputs, where first has 2 and 3; name the same channels in each recording, in the same "
         "order."
     )
+
+
+# ------------------------------------------------------------------------------ what the checks are made of, in numbers
+def test_runs_from_all_over_a_long_record_stand_for_it():
+    values = np.arange(100_000.0)
+    found = channel.subsample(values).reshape(20, 1000)
+    np.testing.assert_array_equal(found[:, 0], np.linspace(0, 99_000, 20).astype(int))
+    np.testing.assert_array_equal(np.diff(found, axis=1), 1.0)
+    short = values[:20_000]
+    assert channel.subsample(short) is short and channel.subsample(values[:20_001]).size == 20_000
+
+
+def test_means_of_blocks_leave_out_the_last_that_is_not_full():
+    values = np.array([1.0, 3.0, 8.0, 10.0, 3.0, 5.0, 100.0])
+    np.testing.assert_array_equal(channel.block_means(values, 2), [2.0, 9.0, 4.0])
+    np.testing.assert_array_equal(channel.block_means(values, 3), [4.0, 6.0])
+    assert channel.block_means(values, 1) is values
+    assert channel.block_means(values, 8).size == 0
+
+
+@pytest.mark.parametrize(
+    ("values", "crossings"),
+    [([0.0, 10.0, 0.0, 10.0], 3), ([0.0, 5.0, 10.0, 5.0], 2), ([-7.0, -3.0, -7.0, -7.0, -6.0], 2), ([4.0, 4.0], 0)],
+)
+def test_a_drive_crosses_the_middle_of_its_own_range(values, crossings):
+    assert channel._crossings(np.array(values)) == crossings
+
+
+@pytest.mark.parametrize(
+    ("drive", "samples"),
+    [
+        ([3.0, 3.0, 3.0, 1.0, 0.0, 2.0, 0.0, 3.0], 4),  # at the top four, three of them together; at the bottom apart
+        ([1.0, 0.0, 0.0, 2.0, 0.0, 3.0], 3),
+        ([0.0, 1.0, 0.0, 1.0], 0),
+        ([1.0, 1.0, 0.0, 0.0, 0.0], 3),
+    ],
+)
+def test_a_drive_rests_at_an_end_where_it_stays_for_two_samples(drive, samples):
+    assert channel._resting(np.array(drive)) == samples
+
+
+def test_a_share_of_the_samples_that_turn_back_is_noise():
+    assert channel._flicker(np.array([0.0, 1.0, 0.0, 1.0, 2.0, 2.0, 1.0]), 1.0) == pytest.approx(2 / 6)
+    assert channel._flicker(np.array([5.0]), 1.0) == 0.0
+
+
+def test_the_places_that_a_drive_visits_are_told_apart_ten_times_as_finely_as_steps():
+    drive = np.linspace(0.0, 3.0, 1000, endpoint=False) + 0.001
+    assert channel._places(drive, 0.25) in (40, 41)
+    assert channel._places(np.repeat([0.0, 1.0, 2.0], 50), 0.1) == 3
+
+
+def test_a_trend_is_what_time_explains_beside_the_drives():
+    """Of a sine of eleven periods and a line; of a line alone that is the drive itself nothing is left."""
+    time = np.linspace(-0.5, 0.5, 1601)
+    waves = np.sin(2 * np.pi * 11 * time), np.cos(2 * np.pi * 7 * time)
+    trend, error = _trend(5.0 + 3.0 * waves[0] - 0.4 * waves[1] - 2.5 * time, [*waves, np.full(1601, 4.0)])
+    assert trend == pytest.approx(-2.5, rel=1e-9) and error < 1e-9
+    assert _trend(time * 3.0, [time + 7.0]) == (0.0, 0.0)
+    steep = _trend(time * 3.0 + waves[0], [0.05 * waves[0] + time * 0.02])
+    assert steep[0] == pytest.approx(2.6, rel=1e-9)  # 20 of the drives explain the wave and 0.4 of the line
+
+
+def test_flat_tops_of_two_peaks_have_their_first_rows_and_what_they_hide():
+    """Parabolas of other heights and widths, cut off at 1; a step up to 1 and a ramp that rests there are none."""
+    time = np.arange(-60.0, 61.0)
+    values = np.concatenate([2.0 - (time / 20) ** 2, 1.5 - (time / 25) ** 2, np.repeat([-8.0, 1.0, -8.0], 40)])
+    values = np.maximum(values, -9.0)
+    values = np.minimum(values, 1.0)
+    drive = np.sin(np.arange(values.size) / 7.0)
+    rows, hidden = channel._flat_tops(values, np.flatnonzero(values == 1.0), 1.0, 0.0, float(np.ptp(values)), [drive])
+    assert rows.tolist() == [40, 121 + 43]  # from -20 on, and from -17 on
+    assert hidden == pytest.approx([1.0, 0.5], rel=0.35)
+    still = [np.zeros(values.size), np.where(np.arange(values.size) < 130, drive, 0.0)]
+    assert channel._flat_tops(values, np.flatnonzero(values == 1.0), 1.0, 0.0, 10.0, still)[0].tolist() == [40]
+    coarse = channel._flat_tops(values, np.flatnonzero(values == 1.0), 1.0, 0.12, 10.0, [drive])
+    assert coarse[0].tolist() == [40]  # six steps of 0.12 are more than the second hides
+
+
+@pytest.mark.parametrize("lag", [-7.25, -3.0, 0.0, 4.5, 11.0])
+def test_the_lag_of_a_correlation_is_that_of_the_input_that_is_most_alike(lag):
+    """Smooth noise, the second of three inputs late by some samples and turned over, of other sizes."""
+    signals = [multisine(seed, 5, 300) for seed in (1, 2, 3)]
+    output = -4.0 * delayed(signals[1], lag / RATE_HZ) + 0.3 * signals[0]
+    found, alike = _correlation(signals, output, 40)
+    assert found == pytest.approx(lag, abs=0.05)
+    assert alike == pytest.approx(1 / math.sqrt(1 + (0.3 / 4) ** 2), abs=0.03)
+
+
+def test_the_response_of_an_output_has_gain_share_and_coherence_of_each_input():
+    one, two = philox(1).standard_normal(20_000), 0.5 * philox(2).standard_normal(20_000)
+    found = _response([one, two], 3.0 * one - 8.0 * two + 2.0 * philox(3).standard_normal(20_000), 500.0, 128)
+    assert found.freq_hz[[0, -1]].tolist() == [500 / 128, 250.0]
+    np.testing.assert_allclose(found.response.mean(axis=0), [3.0, -8.0], rtol=0.02)
+    assert found.share[:, 1].sum() / found.share[:, 0].sum() == pytest.approx((8 * 0.5 / 3) ** 2, rel=0.1)
+    assert found.coherence.mean() == pytest.approx((9 + 16) / (9 + 16 + 4), abs=0.02)
+    assert found.averages == pytest.approx(0.53 * len(range(0, 20_000 - 127, 64)) + 0.47, rel=1e-12)
+    assert _response([np.zeros(500), np.zeros(500)], one[:500], 500.0, 128) is None
+
+
+def test_an_output_is_predicted_by_the_input_that_moves_it_and_by_no_other():
+    inputs = [philox(seed).standard_normal(3000) for seed in (1, 2, 3)]
+    output = np.convolve(inputs[1], [0.0, 0.5, 0.3, 0.1])[:3000] + philox(4).standard_normal(3000)
+    assert _predicts(inputs, output) and _predicts(inputs[1:2], output)
+    assert not _predicts([inputs[0], inputs[2]], output)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "resolution"),
+    [
+        (np.arange(500) * 0.25, 1e-2),
+        (np.arange(500) * 0.004, 1e-3),
+        (3.0 + np.arange(5000) * 0.00025, 1e-5),
+        (np.arange(300) * 7.0, 1.0),
+    ],
+)
+def test_the_digits_of_a_time_are_those_that_all_its_samples_need(numbers, resolution):
+    assert sample_rate._resolution(numbers) == pytest.approx(resolution)
+
+
+@pytest.mark.parametrize(
+    ("steps", "step_s", "resolution_s", "slack"),
+    [
+        ([0.01, 0.01, 0.02, 0.01, 0.01, 0.02], 0.0133333, 0.01, 0.01),
+        ([0.01, 0.01, 0.05, 0.01, 0.01, 0.02], 0.0183333, 0.01, 0.0),
+        ([0.01] * 6, 0.01, 0.01, 0.0),
+        ([0.01, 0.02] * 3, 0.015, 1e-4, 0.0),
+        ([0.0, 0.01, 0.0, 0.01], 0.005, 0.01, 0.01),
+        ([0.01, 0.02], 0.015, 0.0, 0.0),
+    ],
+)
+def test_rounding_excuses_what_strays_by_a_digit_from_an_even_grid(steps, step_s, resolution_s, slack):
+    assert sample_rate._slack(np.array(steps), step_s, resolution_s) == slack
