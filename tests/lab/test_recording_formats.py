@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import math
 import pickle
 import re
 import struct
@@ -1743,3 +1744,192 @@ def test_a_rate_of_an_inner_group_goes_before_that_of_an_outer_one(tmp_path):
     assert read_recording(path, "run/left/u", "run/left/y").rate_hz == 500.0
     assert "500 Hz (run/left/dt = 0.002 s) and 400 Hz (run/fs = 400 Hz), 0.8 times" in refusal(path, "u", "run/y")
     assert "500 Hz (run/left/dt = 0.002 s) and 90 Hz (rate = 90 Hz), 0.18 times" in refusal(path, "u", 3)
+
+
+# ------------------------------------------------------------------------------------- damaged files in all their words
+LVM_HEAD = "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\tOne\n***End_of_Header***\n"
+
+
+def lvm_segment(names="X_Value\tu\ty", steps="0.5\t0.5", rows=250, **cells):
+    """A segment whose rows begin on the sixth line of it; `cells` are others in the place of those of a row."""
+    head = ["", "Channels\t2", f"Delta_X\t{steps}", "***End_of_Header***", names]
+    usual = [f"{0.5 * k!r}\t{math.sin(k)!r}\t{math.cos(1.1 * k)!r}" for k in range(rows)]
+    return "\n".join([*head, *(cells.get(f"row_{k}", row) for k, row in enumerate(usual))]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "channels", "words"),
+    [
+        (
+            LVM_HEAD + lvm_segment(steps="0.5\t0.25"),
+            ("u", "y"),
+            "two sample rates: 2 Hz (Delta_X = 0.5 s of 'u') and 4 Hz (Delta_X = 0.25 s of 'y'), 2 times as much; "
+            "correct the wrong one.",
+        ),
+        (
+            LVM_HEAD + lvm_segment(row_77="38.5\t0.1\tx7"),
+            ("u", "y"),
+            "line 88, channel 2 ('y'): 'x7' is not a finite number; repair the cell or cut the recording there, "
+            "because hysteresis remembers what happened in a gap.",
+        ),
+        (
+            LVM_HEAD + lvm_segment(row_3="1.5\tinf\t0.2", row_9="x\tx\tx"),
+            ("u", "y"),
+            "line 14, channel 1 ('u'): 'inf' is not a finite number; repair the cell or cut the recording there, "
+            "because hysteresis remembers what happened in a gap.",
+        ),
+        (
+            LVM_HEAD + lvm_segment(rows=210) + lvm_segment(rows=240, row_5="2.5\t0.3", steps="0.25\t0.25"),
+            ("1/u", "1/y"),
+            "line 231, channel 5 ('1/y'): the cell is empty; repair the cell or cut the recording there, because "
+            "hysteresis remembers what happened in a gap.",
+        ),
+        (
+            LVM_HEAD + lvm_segment(rows=210) + lvm_segment(steps="0.25\t0.25", rows=240),
+            ("0/u", "1/y"),
+            "channel 1 ('0/u') has 210 samples and channel 5 ('1/y') 240; name channels that were sampled together, or "
+            "cut them to their common time.",
+        ),
+        (
+            LVM_HEAD + lvm_segment(rows=210) + lvm_segment(steps="0.25\t0.25", rows=240),
+            ("1/u", "1/y"),
+            "two sample rates: 4 Hz (Delta_X = 0.25 s of '1/u') and 2 Hz (channel 3 ('1/X_Value'): 240 samples in "
+            "119.5 s), 0.5 times as much; correct the wrong one.",
+        ),
+        (
+            LVM_HEAD + lvm_segment(names="Time\tu\ty"),
+            (0, 1),
+            "line 10 should name the columns, beginning with 'X_Value', and reads 'Time\\u0009u\\u0009y'; export the "
+            "recording again from LabVIEW.",
+        ),
+        (
+            LVM_HEAD.replace("Separator\tTab", "Separator\tSemicolon", 1) + lvm_segment(),
+            (0, 1),
+            "the header names the separator 'Semicolon'; LVM files have Tab or Comma: correct that word, or export the "
+            "recording again from LabVIEW.",
+        ),
+        (
+            LVM_HEAD.replace("\tOne", "\tNo") + lvm_segment(names="X_Value"),
+            (0, 1),
+            "the LVM file has headers and no channel; record again.",
+        ),
+        (
+            LVM_HEAD + "\n1\t2\t3\n",
+            (0, 1),
+            "the LVM file has no segment with a header, so its channels have no names and no time; write it with 'one "
+            "header per segment', or cut the file header off and name the rest .csv.",
+        ),
+        (
+            "LabVIEW Measurement\nSeparator\tTab\n",
+            (0, 1),
+            "the LVM file has no '***End_of_Header***': it is truncated; copy it again.",
+        ),
+    ],
+)
+def test_an_lvm_file_with_a_fault_is_told_in_all_words(tmp_path, text, channels, words):
+    path = tmp_path / "a.lvm"
+    path.write_bytes(text.encode("latin-1"))
+    assert refusal(path, *channels) == f"{path}: {words}"
+
+
+def test_lvm_channels_of_one_name_are_counted(tmp_path):
+    path = tmp_path / "a.lvm"
+    text = LVM_HEAD + lvm_segment(names="X_Value\tu\tu").replace("Channels\t2", "Channels\t2\nY_Unit_Label\tV\tmm")
+    path.write_text(text, encoding="latin-1")
+    source = open_source(path)
+    assert (source.names, source.units) == (("X_Value", "u", "u_1"), ("", "V", "mm"))
+    assert source.samples() == (250, 250, 250) and source.find_time([2]) == 0
+    assert [column[3] for column in source.load([2, 0])] == [math.cos(1.1 * 3), 1.5]
+    assert source.rates([2]) == [StatedRate(2.0, "Delta_X = 0.5 s of 'u_1'")]
+    assert [source.place(row) for row in (0, 249, 250)] == ["line 12", "line 261", "the end"]
+
+
+def tdms_lead(following=4, raw=4, version=4713, mask=2, tag=b"TDSm"):
+    return tag + struct.pack("<l", mask) + struct.pack(f"{'>' if mask & 64 else '<'}lQQ", version, following, raw)
+
+
+@pytest.mark.parametrize(
+    ("content", "segment", "words"),
+    [
+        (
+            tdms_lead() + bytes(4) + b"TDSx" + bytes(30),
+            "segment 1 of the TDMS file, at byte 32,",
+            "should begin with 'TDSm' and begins with b'TDSx'; {again}.",
+        ),
+        (
+            tdms_lead() + bytes(4) + b"TDSm" + bytes(7),
+            "segment 1 of the TDMS file, at byte 32,",
+            "has 11 of the 28 bytes of its lead-in; {again}.",
+        ),
+        (
+            tdms_lead(version=4711) + bytes(4),
+            "segment 0 of the TDMS file, at byte 0,",
+            "states version 4711; versions (4712, 4713) are known; {again}.",
+        ),
+        (
+            tdms_lead(following=2**64 - 1) + bytes(4),
+            "segment 0 of the TDMS file, at byte 0,",
+            "was never completed: the program that wrote it stopped while recording; {again}, or record again.",
+        ),
+        (
+            tdms_lead(6) + bytes(6) + tdms_lead(following=77, raw=3, mask=64) + bytes(70),
+            "segment 1 of the TDMS file, at byte 34,",
+            "is truncated: 7 of its 77 bytes are missing; {again}.",
+        ),
+        (
+            tdms_lead(raw=9) + bytes(4),
+            "segment 0 of the TDMS file, at byte 0,",
+            "places its data at byte 9 of 4; {again}.",
+        ),
+    ],
+)
+def test_a_tdms_file_with_a_fault_is_told_with_segment_and_byte(tmp_path, content, segment, words):
+    path = tmp_path / "a.tdms"
+    path.write_bytes(content)
+    again = "copy the file again from its source, or open and save it in LabVIEW"
+    assert refusal(path, 0, 1) == f"{path}: {segment} {words.format(again=again)}"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ("u", "'u' holds complex numbers, not real numbers; save the real signal."),
+        ("y", "'y' holds text, not real numbers; save numbers, or name another."),
+        (
+            "z",
+            "'z' holds Python objects, which are pickled and not read, because loading them could run code; save them "
+            "as plain numbers, array.astype(float).",
+        ),
+        ("b", "'b' holds booleans, not real numbers; save numbers, or name another."),
+        ("r", "'r' holds records of p, q; save each of these as an array of its own."),
+        ("e", "'e' holds no samples; record again, or name another."),
+        ("one", "'one' is a single number; name an array."),
+        ("d", "'d' holds the type datetime64[s], not real numbers; save it as floating-point numbers."),
+        *(
+            (
+                wanted,
+                "'w' is an array of shape (3, 4, 250): name one channel of it with an index for each axis but the "
+                "samples', 'w[0, 0]', or read it whole by saying what each axis is: --axes (axes), such as "
+                "samples,channels,realisations,periods.",
+            )
+            for wanted in ("w", "w[1]", "w[3, 0]", "w[2, 4]", "w[0, 0, 0]")
+        ),
+    ],
+)
+def test_an_array_that_is_no_channel_says_why_in_all_words(tmp_path, wanted, words):
+    path = tmp_path / "a.npz"
+    records = np.zeros(2, dtype=[("p", "f4"), ("q", "f8")])
+    np.savez(path, u=np.ones(3) + 0j, y=np.array(["a"]), z=np.array([None, 1]), b=np.ones(300) > 0, r=records,
+             e=np.zeros((0, 4)), w=np.zeros((3, 4, 250)), one=np.array(7.0),
+             d=np.zeros(300, dtype="datetime64[s]"))  # fmt: skip
+    assert refusal(path, wanted, "w[0, 0]") == f"{path}: the input '{wanted}' is no channel: {words}"
+
+
+def test_an_index_of_three_axes_takes_the_channel_that_it_counts(tmp_path):
+    rng = np.random.Generator(np.random.Philox(3))
+    values = rng.standard_normal((3, 250, 4))
+    np.savez(tmp_path / "a.npz", w=values, fs=40.0)
+    read = read_recording(tmp_path / "a.npz", ("w[2,1]", "w[0, 3]"), "w[ 1 , 2]", accept=["dead"])
+    np.testing.assert_array_equal(read.drive, np.column_stack([values[2, :, 1], values[0, :, 3]]))
+    np.testing.assert_array_equal(read.output[:, 0], values[1, :, 2])
+    assert read.input_names == ("w[2, 1]", "w[0, 3]")
