@@ -3,12 +3,14 @@
 import hashlib
 import os
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from microrad.lab.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
 from microrad.lab.recording.formats.text import TextSource
+from microrad.lab.recording.records import Finding, check_stated, digest_of, frozen, read_in, stated_units
 
 N = 400
 TIME = np.arange(N) / 100.0
@@ -542,3 +544,56 @@ def test_arrays_of_several_channels_have_names_and_numbers_of_their_own():
             f"b: drive has shape {shapes[0]} and output {shapes[1]}; give arrays of shape (samples,) or (samples, "
             "channels) with equally many samples."
         )
+
+
+@pytest.mark.parametrize(
+    ("units", "names", "said"),
+    [
+        (("µrad", " microrad ", ""), ("x", "y", "z [V]"), {"urad"}),
+        (("", ""), ("x (μm)", "u [ volts ]"), {"um", "V"}),
+        (("", " "), ("x (2)", "y [mm], raw"), set()),
+        (("furlong",), ("x (mm)",), {"furlong"}),
+        ((), ("x(mV)", "y"), {"mV"}),
+        (("",), ("x (left) (rad)",), {"rad"}),
+        (("Volt", "volt"), ("x", "y"), {"Volt", "V"}),
+    ],
+)
+def test_units_are_those_stated_else_those_known_in_brackets_at_the_end(units, names, said):
+    assert stated_units(units, names) == said
+
+
+@pytest.mark.parametrize(
+    ("which", "unit", "words"),
+    [
+        ("input", "V", "the drive is to be read in V and the file says V, mV"),
+        ("output", "mm", "the output is to be read in mm and the file says um"),
+        ("output", "um", ""),
+    ],
+)
+def test_a_unit_is_held_against_those_of_all_channels_of_its_side(which, unit, words):
+    made = recording_from_arrays(np.column_stack((DRIVE, np.cos(1.7 * TIME))), OUTPUT, 100.0, "b")
+    made = replace(made, input_units=("V", "mV"), output_units=("µm",))
+    if not words:
+        assert check_stated(made, which, unit) is None
+        assert read_in(replace(made, input_units=("volts", "V")), "V", "um").input_units == ("volts", "V")
+        return
+    with pytest.raises(RecordingError) as caught:
+        check_stated(made, which, unit)
+    assert str(caught.value) == f"b: {words}; give the unit that the file says, or convert its values."
+    with pytest.raises(RecordingError, match="to be read in"):
+        read_in(made, *(("V", "um") if which == "input" else ("mV", "mm")))
+
+
+def test_a_digest_is_that_of_all_bytes_in_their_order_whatever_their_layout():
+    one, two = np.arange(6.0).reshape(2, 3), np.arange(4.0)
+    expected = hashlib.sha256(one.tobytes() + two.tobytes()).hexdigest()
+    assert digest_of(one, two) == digest_of(np.asfortranarray(one), two) == expected != digest_of(two, one)
+    kept = frozen(np.asfortranarray(one))
+    assert kept.flags.c_contiguous and not kept.flags.writeable
+
+
+def test_the_error_of_a_recording_is_one_line_with_its_evidence():
+    finding = Finding("lead", "y", 7, "y leads", True, 2)
+    error = RecordingError("a\nb.csv: y leads", [finding])
+    assert (str(error), error.findings, error.page) == ("a\\u000ab.csv: y leads", (finding,), "recordings")
+    assert RecordingError("x").findings == ()

@@ -856,3 +856,75 @@ def test_an_angle_between_displacements_keeps_its_column_of_zeros():
     seen = [plane[2] + y * plane[0] - x * plane[1] for x, y in (place or (9.0, 9.0) for place in places)]
     np.testing.assert_allclose(matrix @ seen, plane, rtol=1e-12)
     assert not matrix[:, 1].any()
+
+
+def test_a_row_that_is_no_mirror_is_drawn_again_by_its_own_number():
+    """Of two exponents, each row asks for others by its number, and the first of them that is a mirror counts."""
+    first = replace(handmade().mirror.bouc_wen[0], exponent=1.5)
+    known = Known(("hysteresis.1.exponent", "recording.delay"), np.array([0.5, 1e-5]), np.eye(2))
+    mirror = replace(handmade(), mirror=replace(handmade().mirror, bouc_wen=(first,)), known=known)
+    others = {1: [[-3.0, 0.0], [1.0, 0.5]], 3: [[0.25, -0.5], [2.0, 2.0]]}
+    rows = np.array([[0.5, 1.0], [-2.0, 0.0], [-0.75, 3.0], [-1.5, 9.0]])
+    found = accepted(mirror, rows, lambda row: iter(np.array(others.get(row, []))))
+    np.testing.assert_array_equal(found, [[0.5, 1.0], [1.0, 0.5], [-0.75, 3.0], [0.25, -0.5]])
+    assert directions(mirror) == 2 and known.correlation.tolist() == np.eye(2).tolist()
+    third = moved(mirror, found[2])
+    assert third.mirror.bouc_wen[0].exponent == pytest.approx(1.125)
+    assert (third.delay_s, third.known) == (pytest.approx(2.3e-4), None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "one"),
+    [
+        ({}, True),
+        ({"hysteresis.3.thresholds.2": -1.5}, False),  # both at 0.5 V
+        ({"hysteresis.3.thresholds.2": -1.4}, True),
+        ({"hysteresis.2.thresholds.2": -1.5}, False),
+        ({"hysteresis.1.exponent": -1.5}, True),
+        ({"hysteresis.1.exponent": -1.6}, False),
+        ({"hysteresis.1.alpha": -0.5}, False),
+        ({"modes.decay.1": -19.0}, True),
+    ],
+)
+def test_each_reason_by_itself_makes_a_changed_mirror_none(changes, one):
+    assert is_one(changed(handmade(), changes)) is one
+
+
+def test_the_response_of_a_mirror_by_hand_is_that_of_its_twin():
+    """Two drives, one output, elements with rate and polynomial left out; no state, and elements straight through."""
+    mirror = handmade()
+    drives = np.random.Generator(np.random.Philox(4)).standard_normal((40, 2))
+    still = replace(
+        mirror.mirror,
+        **{"A": np.zeros((0, 0)), "B": np.zeros((0, 2)), "E": np.zeros((0, 2)), "F": np.zeros((2, 0))},
+        **{"C": np.zeros((1, 0)), "G": mirror.mirror.G[1:], "K": mirror.mirror.K[:, 1:], "bouc_wen": ()},
+        plays=(replace(mirror.mirror.plays[0], widening_s=0.0), mirror.mirror.plays[1]),
+    )
+    found = replace(mirror, mirror=still, delay_s=0.0, steps_per_sample=1).response(drives)
+    expected = []
+    states = [np.zeros(2), np.zeros(3)]
+    for u in drives:
+        total = float(still.D[0] @ u)
+        for k, play in enumerate(still.plays):
+            q, r = float(still.G[k] @ u), np.array(play.thresholds_v)
+            states[k] = np.maximum(q - r, np.minimum(q + r, states[k]))
+            z = float(states[k] @ play.weights_rad_v)
+            if k == 1:
+                s = min(max(q / 6.0, -1.0), 1.0)
+                z += 0.7 * s**2 - 0.8 * abs(s) * s + 0.9 * s**3
+            total += still.K[0, k] * z
+        expected.append(total)
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "A",
+    [
+        [[-5.0, 3.0, 0.0], [-3.0, -5.0, 0.0], [0.0, 0.0, -2.0]],
+        [[-2.0, 0.0, 0.0], [0.0, -5.0, -4.0], [0.0, 4.0, -5.0]],
+    ],
+)
+def test_a_real_mode_may_stand_before_or_behind_a_pair(A):
+    roots = coupled.modes(np.array(A))
+    assert sorted(roots) == ([(-5.0, -3.0), (-2.0, 0.0)] if A[0][0] == -5.0 else [(-5.0, 4.0), (-2.0, 0.0)])
+    np.testing.assert_array_equal(lti.modal_matrix(roots), A)

@@ -9,6 +9,7 @@ import pytest
 from microrad import mirror
 from microrad.mirror import Variant, hysteresis
 from microrad.mission.file import load_mission
+from microrad.mission.tables.mirror import CreepTable, PrandtlIshlinskiiTable
 from shipped import SHIPPED
 
 
@@ -59,3 +60,38 @@ def test_a_mission_without_a_comparison_has_two_variants():
     parts = mirror.of(mission(comparison=None))
     assert tuple(parts.own) == (Variant.GIVEN, Variant.STRAIGHT)
     assert tuple(parts.line_of_sight) == (Variant.GIVEN, Variant.STRAIGHT)
+
+
+def test_a_mirror_of_numbers_all_unlike_has_each_of_its_variants_by_its_own():
+    """A mechanical angle, a Prandtl-Ishlinskii mirror with creep about a bias, and an amplitude between its plays."""
+    given = mission("mechanical")
+    plays = {"thresholds_v": (0.0, 0.5, 2.0), "weights_rad_v": (4e-5, 1e-5, 5e-6), "widening_s": 0.0}
+    table = given.mirror.model_copy(
+        update={
+            "bouc_wen": None,
+            "prandtl_ishlinskii": PrandtlIshlinskiiTable.model_construct(**plays),
+            "creep": CreepTable.model_construct(time_constants_s=(0.5, 4.0), weights_rad_v=(1e-6, -2e-6)),
+            "bias_v": 4.5,
+            "drive_min_v": 1.25,
+            "drive_max_v": 11.0,
+        }
+    )
+    parts = mirror.of(
+        given.model_copy(
+            update={"mirror": table, "scenario": given.scenario.model_copy(update={"amplitude_rad": 1e-4})}
+        )
+    )
+    own = hysteresis.PrandtlIshlinskii((0.0, 0.5, 2.0), (4e-5, 1e-5, 5e-6))
+    assert parts.table is table and parts.line_of_sight_per_own == 2.0
+    assert parts.drive_range_v == (-3.25, 6.5)
+    assert parts.own[Variant.GIVEN].model == own
+    assert parts.line_of_sight[Variant.GIVEN].model == hysteresis.scaled(own, 2.0)
+    assert parts.own[Variant.STRAIGHT].model.d1_rad_v == pytest.approx(5.5e-5, rel=1e-12)
+    # 100 urad outside are 50 urad of tilt: 20 up to 0.5 V, the other 30 at 50 urad/V
+    assert parts.line_of_sight[Variant.STRAIGHT].model.d1_rad_v == pytest.approx(1e-4 / 1.1, rel=1e-12)
+    for found, times in ((parts.own, 1.0), (parts.line_of_sight, 2.0)):
+        for axis in found.values():
+            assert axis.plant.inverse == (axis.model,)
+            np.testing.assert_allclose(axis.plant.C[0, -2:], [times * 1e-6, times * -2e-6], rtol=1e-12)
+            np.testing.assert_allclose(np.diag(axis.plant.A)[-2:], [-2.0, -0.25], rtol=1e-12)
+    assert parts.own[Variant.COMPARISON].model.bias_v == 4.5
