@@ -922,7 +922,7 @@ def with_samples(values, **changes):
         (
             BOTH,
             (BOTH[0], np.full(N, -2.5)),
-            "the output 1, is constant at -2.5, so nothing can be learnt from it; choose another column or check the "
+            "the output 1 is constant at -2.5, so nothing can be learnt from it; choose another column or check the "
             "sensor's wiring and range.",
         ),
         (

@@ -102,7 +102,7 @@ def _check_varies(where: str, role: str, label: str, values: Floats) -> None:
         remedy = "drive the mirror up and down" if role == "input" else "check the sensor's wiring and range"
         named = label if label.startswith(f"the {role}") else f"the {role}, {label}"
         raise RecordingError(
-            f"{where}: {named}, is constant at {values[0]:g}, so nothing can be learnt from it; "
+            f"{where}: {named}{',' * (',' in named)} is constant at {values[0]:g}, so nothing can be learnt from it; "
             f"choose another column or {remedy}."
         )
 
