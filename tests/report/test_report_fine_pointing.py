@@ -1324,7 +1324,7 @@ def test_a_worst_case_has_each_figure_beside_its_own_index_and_parameter():
         " alpha       +2.5     −1.2        +0.8",
         " mode 1      −2.5     +0.5        −0.2",
         "",
-        "1 corners are no mirrors and are left out.",
+        "1 corner is no mirror and is left out.",
         ("The loop is unstable on 3 of the draws and on 2 of the corners: no margin, and an error without bound."),
         ("Simulated at the smallest margin for 125 ms, from an offset of 3.00 µrad, without disturbances: the loop"),
         (

@@ -1343,7 +1343,7 @@ def test_an_installation_that_fails_in_each_way_says_so_in_each_part():
     assert [page.headline(v), *page.summary(v)] == [
         (
             "This installation does not hold: 2 of 6 comparisons are beyond their tolerance "
-            "and 1 checks did not run (c4)."
+            "and 1 check did not run (c4)."
         ),
         (
             "6 printed quantities are registered: 1 validated, 2 verified, 1 traced, 1 none, 1 "
@@ -1506,7 +1506,7 @@ def test_the_data_of_a_verification_have_each_number_under_its_own_name():
         "ok": False,
         "headline": (
             "This installation does not hold: 2 of 6 comparisons are beyond their tolerance "
-            "and 1 checks did not run (c4)."
+            "and 1 check did not run (c4)."
         ),
         "summary": [
             (
