@@ -1,7 +1,7 @@
 """The ladder for several channels: what it chooses, what it hands on bit for bit, how it stops, what it refuses."""
 
 import re
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -20,7 +20,7 @@ from microrad.lab.identify.coupled.held_out import held_out_error, smallest_with
 from microrad.lab.identify.coupled.ladder import LadderOptions
 from microrad.lab.identify.coupled.mirror_file import coupled_file_text
 from microrad.lab.identify.linear.modal import ModalModel
-from microrad.lab.identify.linear.response import response_from_periods
+from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness.fit import amplitude_classes
 from microrad.lab.recording import Recording, multisine_recordings
@@ -693,3 +693,494 @@ def test_the_noise_of_a_period_is_known_from_two_on(period, known):
         assert found[0] == pytest.approx(0.0, abs=1e-15)
         periods = output[: 12 // period * period, 1].reshape(-1, period)
         assert found[1] == pytest.approx(np.mean(np.var(periods - periods.mean(axis=1)[:, None], axis=0, ddof=1)))
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def drawn_at_random(name, samples=12, inputs=2, seed=0, period=None, size=1.0, rate_hz=250.0):
+    """A record of as many drives and two outputs, every number its own."""
+    draw = philox(seed)
+    drive, output = size * draw.standard_normal((samples, inputs)), draw.standard_normal((samples, 2))
+    inputs, outputs = tuple(f"u{k}" for k in range(inputs)), ("x", "y")
+    return Recording(name, name, drive, output, rate_hz, inputs, outputs, period)
+
+
+def test_actuators_have_the_extremes_of_all_records_that_are_not_for_validation():
+    """In mV: the first drive is fastest and lowest in the first record, the second one in the second record."""
+    first = np.array([[2000.0, 50.0], [1000.0, 60.0], [4000.0, 40.0], [2000.0, 50.0]])
+    second = np.array([[1000.0, 70.0], [1500.0, 10.0], [5000.0, 90.0], [1000.0, 70.0]])
+    far = 100.0 * first
+    output = np.array([[1.0, 10.0], [2.0, 30.0], [4.0, 20.0], [8.0, 40.0]])
+    given = [
+        Recording(name, name, drive, output + k, 250.0, ("a", "b"), ("x", "y"))
+        for k, (name, drive) in enumerate((("one", first), ("two", second), ("far", far)))
+    ]
+    found = channels(given[:2], given[2:], "mV", "um", [(1, 2), (3, 4)])
+    assert [actuator.name for actuator in found.actuators] == ["a", "b"]
+    numbers = [astuple(actuator)[1:] for actuator in found.actuators]
+    np.testing.assert_allclose(numbers, [[1.5, 1.0, 5.0, 1000.0], [0.06, 0.01, 0.09, 20.0]], rtol=1e-12)
+    assert [(o.name, o.quantity, o.position_m) for o in found.outputs] == [
+        ("x", "displacement", (1.0, 2.0)),
+        ("y", "displacement", (3.0, 4.0)),
+    ]
+    assert all(isinstance(v, float) for o in found.outputs for v in o.position_m)
+    assert [r.path for r in found.fitted] == ["one", "two"] and [r.path for r in found.held_out] == ["far"]
+    np.testing.assert_allclose(found.fitted[1].drive[2], [3.5, 0.03], rtol=1e-12)
+    np.testing.assert_allclose(found.held_out[0].output[3], [10e-6, 42e-6], rtol=1e-12)
+    assert found.periodic is False and found.rate_hz == 250.0
+
+
+def test_the_last_record_of_each_amplitude_and_set_of_drives_is_held_out():
+    """Small and large ones of both drives, and two of the first drive alone; one of the second drive alone."""
+    both, first, second = np.ones(2), np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    sizes = [
+        1.0 * both,
+        1.41421356 * first,
+        3.0 * both,
+        1.0 * both,
+        1.41421356 * second,
+        1.41421356 * first,
+        3.0 * both,
+    ]
+    one = drawn_at_random("", 400, seed=3)
+    drive = one.drive / one.drive.std(axis=0)
+    given = [replace(one, path=f"r{k}", sha256=str(k), drive=size * drive) for k, size in enumerate(sizes)]
+    found = channels(given, (), "V", "rad", None)
+    assert [r.path for r in found.held_out] == ["r3", "r5", "r6"]
+    assert [r.path for r in found.fitted] == ["r0", "r1", "r2", "r4"]
+    np.testing.assert_allclose(found.amplitudes_v, [1.0, 3.0], rtol=1e-6)
+    assert (found.fitted_class.tolist(), found.held_class.tolist()) == ([0, 0, 1, 0], [0, 0, 1])
+    assert [r.path for r in found.of_amplitude(0)] == ["r0", "r1", "r4"]
+    assert [r.path for r in found.of_amplitude(1)] == ["r2"]
+
+
+@pytest.mark.parametrize("periods", [(None, None, 4), (4, 4, None)])
+def test_the_third_of_three_records_may_be_the_one_of_another_kind(periods):
+    given = [drawn_at_random(f"r{k}", seed=k, period=period) for k, period in enumerate(periods)]
+    with pytest.raises(IdentificationError) as caught:
+        channels(given, (), "V", "rad", None)
+    assert str(caught.value) == (
+        "r2: of this record and r0 one is periodic and the other is not; fit records of one kind, and give the others "
+        "for validation."
+    )
+    assert channels(given[:2], given[2:], "V", "rad", None).periodic is (periods[0] == 4)
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        (("uV", "rad"), "input unit 'uV' is not known; use one of V, mV."),
+        (
+            ("mV", "deg"),
+            "output unit 'deg' is not known; use an angle (rad, mrad, urad) or a length (m, mm, um).",
+        ),
+    ],
+)
+def test_a_unit_of_channels_that_is_not_known_is_told_with_those_that_are(units, message):
+    with pytest.raises(IdentificationError) as caught:
+        channels([drawn_at_random("r")], [drawn_at_random("s", seed=1)], *units, None)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("unit", "quantity", "size"),
+    [
+        ("rad", "angle", 1.0),
+        ("mrad", "angle", 1e-3),
+        ("urad", "angle", 1e-6),
+        ("m", "displacement", 1.0),
+        ("mm", "displacement", 1e-3),
+        ("um", "displacement", 1e-6),
+    ],
+)
+@pytest.mark.parametrize(("volt", "volts"), [("V", 1.0), ("mV", 1e-3)])
+def test_each_unit_of_channels_has_its_size(unit, quantity, size, volt, volts):
+    assert channels_module._units(volt, unit) == (volts, quantity, size)
+
+
+def test_records_of_which_none_can_be_held_out_are_told_in_full():
+    one = drawn_at_random("r", 400, period=200)
+    with pytest.raises(IdentificationError) as caught:
+        channels([one, replace(one, drive=2 * one.drive), replace(one, drive=4 * one.drive)], (), "V", "rad", None)
+    assert str(caught.value) == (
+        "3 records, no two of one amplitude with the same channels driven: none can be held out to judge the models "
+        "by; record another realisation, or give recordings for validation."
+    )
+    three = [drawn_at_random(f"r{k}", 400, 3, seed=k, period=200) for k in range(3)]
+    with pytest.raises(IdentificationError) as caught:
+        channels(three, (), "V", "rad", None)
+    assert str(caught.value) == (
+        "3 records for 3 actuators: 1 held out to judge the models by leave 2, and at least 3 realisations with "
+        "different drives are needed; record more, or give recordings for validation."
+    )
+
+
+@pytest.mark.parametrize(("largest", "rest"), [(80.0, 1.2345679), (8.0, 1.23456789), (800.0, 1.234568)])
+def test_a_bias_is_rounded_to_a_billionth_of_the_largest_drive(largest, rest):
+    drive = np.array([[1.234567891], [largest], [1.0]])
+    assert _rounded_bias([SimpleNamespace(drive=drive, period_samples=None)]).tolist() == [rest]
+
+
+def test_a_record_that_does_not_repeat_goes_back_to_rest_behind_its_end():
+    """An eighth of its length, as half a cosine; a periodic one has one period before it."""
+    given = []
+
+    def response(drive):
+        given.append(drive)
+        return np.arange(2.0 * len(drive)).reshape(-1, 2)
+
+    model, record = SimpleNamespace(response=response), drawn_at_random("r", 35)
+    assert held_out_module.modelled_output(model, record).shape == (35, 2)
+    moved = record.drive - record.drive[0]
+    fall = [0.5 * (1 + np.cos(np.pi * k / 4)) for k in (1, 2, 3, 4)]
+    np.testing.assert_allclose(given[0], [*moved, *np.outer(fall, moved[-1])], atol=1e-15)
+    behind = held_out_module.modelled_output(model, replace(record, period_samples=10))
+    np.testing.assert_allclose(given[1], [*record.drive[:10], *record.drive])
+    assert behind[0].tolist() == [20.0, 21.0] and behind.shape == (35, 2)
+    left = held_out_error(model, replace(record, period_samples=10))
+    np.testing.assert_allclose(left, (record.output - behind) - (record.output - behind).mean(axis=0), atol=1e-12)
+
+
+OF_LINES = (3.0, 0.5, 2.0, 1.0), (1.5, 4.0, 0.25, 6.0), (0.75, 1.25, 5.0, 2.5)
+
+
+def test_errors_of_two_amplitudes_are_kept_apart_and_shares_are_of_each_record():
+    """A model that stands still: what is left is the output. The last of three lines is on the last edge."""
+    time = np.arange(40) / 20.0
+    parts = [np.sin(2 * np.pi * f * time) for f in (1.0, 3.0, 5.0)]
+    outputs = [
+        np.column_stack([a * parts[0] + b * parts[1] + c * parts[2], d * parts[1] + 7.0]) for a, b, c, d in OF_LINES
+    ]
+    held = [
+        Recording(f"r{k}", "", output, output, 20.0, ("u", "v"), ("x", "y"), 20 if k else None)
+        for k, output in enumerate(outputs)
+    ]
+    every = SimpleNamespace(
+        held_out=held, amplitudes_v=np.array([1.0, 2.0]), held_class=np.array([1, 0, 1]), rate_hz=20.0
+    )
+    still = SimpleNamespace(response=lambda drive: np.zeros((len(drive), 2)))
+    found = held_out_module.judge(still, every, np.array([0.5, 2.0, 5.0]))
+    squares = np.array([[(a * a + b * b + c * c) / 2, d * d / 2] for a, b, c, d in OF_LINES])
+    np.testing.assert_allclose(found.error_rms, np.sqrt([squares[1], (squares[0] + squares[2]) / 2]))
+    low = np.array([[a * a / 2, 0.0] for a, *_ in OF_LINES])
+    high = squares - low
+    expected = [[each[1], (each[0] + each[2]) / 2] for each in (low, high)]
+    np.testing.assert_allclose(found.band_error_rms, np.sqrt(expected).swapaxes(0, 1), atol=1e-12)
+    np.testing.assert_allclose(found.record_share, np.ones((3, 2)))
+    assert [loss.size for loss in found.losses] == [40, 20, 20]
+    assert isinstance(found.share, float) and found.share == pytest.approx(1.0)
+    np.testing.assert_allclose(held_out_module.output_rms(every), found.error_rms)
+
+
+def test_the_share_is_the_root_of_the_mean_loss_of_records_of_unlike_length():
+    one, other = np.full(3, 4.0), np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    own = held_out_module.Judged(np.ones(1), np.ones(1), np.ones(1), (one, other))
+    assert own.share == pytest.approx(np.sqrt((4.0 + 3.0) / 2))
+
+
+def test_of_models_as_small_the_one_with_the_lower_error_is_taken():
+    noise = philox(0).standard_normal(400)
+    each = [
+        SimpleNamespace(losses=(losses,), share=float(np.sqrt(losses.mean())))
+        for losses in (9 * noise**2, (noise + 0.02 * philox(2).standard_normal(400)) ** 2, noise**2, noise**2 + 1e-9)
+    ]
+    best = int(np.argmin([own.share for own in each]))
+    assert smallest_within_noise(each, [1, 5, 5, 9])[1:] == (best, [1, 2, 3])
+    assert smallest_within_noise(each, [1, 5, 5, 9])[0] == min((1, 2), key=lambda k: each[k].share)
+    assert smallest_within_noise(each, [1, 6, 5, 2])[0] == 3
+
+
+def modelled(name, share, parameters, kind="coupled linear", order=4, note=""):
+    """A candidate and its errors, as far as words are made of them."""
+    own = SimpleNamespace(name=name, kind=kind, order=order, parameters=parameters, error_share=share, note=note)
+    return own, SimpleNamespace(losses=(np.full(50, share**2),), share=share)
+
+
+def of_models(*found, **of):
+    """A ladder that has found them."""
+    given = {"records": None, "response": None, "bands_hz": np.ones(1), "on_model": lambda candidate: None}
+    return ladder._Ladder(**given | of, found=list(found))
+
+
+THREE = (
+    modelled("large", 0.31, 40, order=8),
+    modelled("best", 0.01234567, 30, order=6),
+    modelled("small", 0.0125, 20, "per axis", order=12),
+)
+
+
+def test_the_best_so_far_is_told_in_three_digits_behind_what_is_done():
+    told = []
+    one = of_models(*THREE, done=3, total=7, left=["coupled linear, order 8"])
+    one.on_progress = lambda *args: told.append(args)
+    one._iteration(2, 25, "the text of the search")
+    best = "; best so far best: 1.23 % of the output on held-out records"
+    assert told == [(3, 7, f"coupled linear, order 8, iteration 2 of 25{best}")]
+    assert of_models()._so_far() == ""
+
+
+def test_a_choice_says_in_full_what_it_leaves_and_what_the_best_would():
+    one = of_models(*THREE)
+    assert one._reason(2, 1) == (
+        "small (20 parameters) leaves 1.25 % of the output on the held-out records; the least, 1.23 % by best with 30 "
+        "parameters, is less by no more than two standard errors of the difference, so the smaller model is taken."
+    )
+    assert one._reason(1, 1) == (
+        "best (30 parameters) leaves 1.23 % of the output on the held-out records, less than any other by more than "
+        "its noise."
+    )
+
+
+def test_the_largest_model_is_the_largest_of_its_own_kind():
+    small, best = modelled("small", 0.2, 20, "per axis", 12)[0], modelled("best", 0.1, 30, order=6, note="so and so")[0]
+    least = "The least error is that of the largest model of its kind that was tried, best: a larger one may have less."
+    assert list(of_models((small, None), (best, None))._warnings(small, best)) == [least]
+    assert list(of_models((small, None), (best, None))._warnings(best, best)) == ["best: so and so.", least]
+    other = modelled("other", 0.3, 40, order=8)[0]
+    assert list(of_models((small, None), (best, None), (other, None))._warnings(best, best)) == ["best: so and so."]
+
+
+def test_where_no_model_is_found_the_first_refusal_is_told_with_its_model():
+    one = of_models(records=SimpleNamespace(), refused=[ladder.Refused("a", "why not"), ladder.Refused("b", "other")])
+    with pytest.raises(IdentificationError, match=r"^no model could be fitted: a: why not$"):
+        one.result(stopped=False)
+
+
+@pytest.mark.parametrize(("first", "size"), [(1, "0.123"), (0, "4.57")])
+def test_the_one_amplitude_of_the_fitted_records_is_told_though_others_are_for_validation(first, size):
+    records = SimpleNamespace(
+        periodic=True, fitted_class=np.array([first, first]), amplitudes_v=np.array([4.56789, 0.1234567])
+    )
+    assert of_models(records=records)._no_hysteresis() == (
+        f"all fitted records have one amplitude, {size} V rms: hysteresis cannot be told from linear stiffness; add "
+        "records of another amplitude, twice as large for example"
+    )
+    assert of_models(records=replace_in(records, fitted_class=np.array([0, 1])))._no_hysteresis() == ""
+    assert of_models(records=replace_in(records, periodic=False))._no_hysteresis() == (
+        "it takes multisines of at least two amplitudes in their steady state, and no record is periodic"
+    )
+
+
+def replace_in(given, **changes):
+    return SimpleNamespace(**vars(given) | changes)
+
+
+def test_how_gain_and_resonance_change_is_told_by_the_order_that_is_best_of_the_linear_ones(monkeypatch):
+    fits = []
+    monkeypatch.setattr(ladder, "fit_linear", lambda group, order, **given: fits.append((group, order, given)) or order)
+    monkeypatch.setattr(ladder, "amplitude_dependence", lambda each: ("dependence", each))
+    groups = SimpleNamespace(of_amplitude=lambda number: [f"records of {number}"])
+    stiff = modelled("stiff", 0.001, 50, "hysteretic stiffness", 10)
+    one = of_models(*THREE, stiff, records=groups)
+    assert one._dependence(["a", None, "c"]) == ("dependence", [6, 6])
+    assert fits == [(["records of 0"], 6, {"exchanges": 0}), (["records of 2"], 6, {"exchanges": 0})]
+    assert one._dependence(["a", None, None]) is None
+    assert of_models(THREE[2], stiff, records=groups)._dependence(["a", "b"]) is None
+
+    def refused(each):
+        raise IdentificationError("no resonance")
+
+    monkeypatch.setattr(ladder, "amplitude_dependence", refused)
+    assert one._dependence(["a", "b"]) is None
+
+
+@pytest.mark.parametrize("orders", [[2, 4, 6, 8], [6, 8, 12]])
+def test_hysteresis_begins_at_the_linear_order_that_would_be_chosen_of_those_found(orders):
+    """A model of each axis and one with hysteresis that are better still count for nothing."""
+    axis, stiff = modelled("axis", 1e-3, 2, "per axis", 2), modelled("stiff", 1e-4, 2, "hysteretic stiffness", 8)
+    one = of_models(axis, THREE[0], THREE[1], stiff)
+    assert one._best_and_next(orders) == orders[orders.index(6) :][:2]
+    assert of_models(axis, stiff)._best_and_next(orders) == orders[:1]
+
+
+def test_a_candidate_and_the_best_are_found_among_several():
+    one = object.__new__(ladder.CoupledIdentification)
+    vars(one).update(candidates=tuple(own for own, _ in THREE), chosen="small")
+    assert (one.candidate().name, one.candidate("large").name, one.best.name) == ("small", "large", "best")
+    with pytest.raises(IdentificationError, match=r"^no model 'tiny' was fitted; there are large, best, small\.$"):
+        one.candidate("tiny")
+
+
+# ------------------------------------------------------------------------------------------------- linear candidates
+def real_and_pair():
+    """A real pole and two pairs, two drives and three outputs, every number its own."""
+    poles = np.array([-70.0 + 0j, -18.0 + 900j, -34.0 + 1700j])
+    draw = philox(8)
+    b, c = draw.standard_normal((3, 2, 2)), draw.standard_normal((2, 3, 3))
+    b, c = b[..., 0] + 1j * b[..., 1], c[0] + 1j * c[1]
+    b[0], c[:, 0] = b[0].real, c[:, 0].real
+    return ModalModel(poles, b, c, draw.standard_normal((3, 2)))
+
+
+def test_numbers_of_a_model_are_named_as_in_the_file_and_counted_on_behind_others():
+    model = real_and_pair()
+    own = linear_errors.names(model, [1], [0, 2], states=3, modes=2)
+    assert own == (
+        *(f"modes.decay.{k}" for k in (3, 4, 5)),
+        *(f"modes.frequency.{k}" for k in (4, 5)),
+        *(f"matrices.B.{k}.2" for k in (4, 5, 6, 7, 8)),
+        *(f"matrices.C.{o}.{k}" for o in (1, 3) for k in (4, 5, 6, 7, 8)),
+        *("matrices.D.1.2", "matrices.D.3.2"),
+        "recording.delay",
+    )
+    both = linear_errors.names(model, [0, 1], [1])
+    assert both[5:9] == ("matrices.B.1.1", "matrices.B.1.2", "matrices.B.2.1", "matrices.B.2.2")
+    assert both[-3:] == ("matrices.D.2.1", "matrices.D.2.2", "recording.delay")
+
+
+def test_the_errors_of_real_poles_have_no_imaginary_part_and_those_of_pairs_both():
+    moved = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 9.0], [0.0, 1.0, 2.0, 3.0, 12.0, 9.0]])
+    found = linear._pole_errors(real_and_pair(), moved)
+    np.testing.assert_allclose(found, [1.0, np.sqrt(5) + 5j, np.sqrt(13) + 13j])
+
+
+def test_what_is_known_of_numbers_leaves_those_out_that_no_record_moves():
+    moved = np.array([[3.0, 0.0, 1.0], [4.0, 0.0, -2.0]])
+    found = linear_errors.known(("a", "b", "c"), moved)
+    assert found.parameters == ("a", "c")
+    np.testing.assert_allclose(found.standard_errors, [5.0, np.sqrt(5.0)])
+    np.testing.assert_allclose(found.factor, [[0.6, 0.8], np.array([1.0, -2.0]) / np.sqrt(5.0)])
+
+
+def table_of(response, powers, rate_hz=1000.0):
+    """A response (lines, outputs, inputs) at 1 Hz, 2 Hz ... to drives of these powers, with cross terms."""
+    lines, outputs, inputs = response.shape
+    cross = 0.1 * np.array([[0.0, 1j], [-1j, 0.0]]) if inputs == 2 else np.zeros((inputs, inputs))
+    return FrequencyResponse(
+        np.arange(1.0, lines + 1.0),
+        response,
+        np.ones(response.shape),
+        None,
+        None,
+        np.ones((lines, outputs)),
+        np.tile(np.diag(powers) + cross, (lines, 1, 1)),
+        np.zeros((lines, outputs)),
+        np.sqrt(np.asarray(powers)),
+        (1.0, float(lines)),
+        "made up",
+        rate_hz,
+        tuple(f"u{k}" for k in range(inputs)),
+        tuple(f"y{k}" for k in range(outputs)),
+    )
+
+
+def test_the_drive_that_makes_most_of_an_output_counts_by_its_power():
+    gain = np.zeros((5, 3, 2), dtype=complex)
+    gain[:] = [[3.0, 1.0], [-2.0j, 1.0], [1.0, 1.0j]]
+    assert linear.strongest_drives(table_of(gain, (1.0, 3.9))) == [0, 0, 1]
+    assert linear.strongest_drives(table_of(gain, (1.0, 4.1))) == [0, 1, 1]
+    gain[4] = [[0.0, 9.0], [0.0, 0.0], [9.0, 0.0]]
+    assert linear.strongest_drives(table_of(gain, (1.0, 1.0))) == [1, 0, 0]
+
+
+def test_the_response_of_one_pair_is_without_the_delay_and_of_its_own_drive():
+    gain = philox(5).standard_normal((4, 3, 2)) * np.exp(1j)
+    own = linear._of_pair(table_of(gain, (2.0, 5.0)), 2, 1, 0.03)
+    ahead = np.exp(2j * np.pi * np.arange(1.0, 5.0) * 0.03)
+    np.testing.assert_allclose(own.response, (gain[:, 2, 1] * ahead)[:, None, None])
+    np.testing.assert_allclose(own.drive_power, np.full((4, 1, 1), 5.0))
+    assert (own.hold, own.rate_hz) == ("first-order", 2000.0)
+
+
+def test_models_placed_among_other_channels_stand_side_by_side():
+    poles, direct = np.array([-3.0 + 0j, -2.0 + 7j]), np.array([[0.25]])
+    one = ModalModel(poles, np.array([[1.5], [1 + 2j]]), np.array([[4.0, 3 - 5j]]), direct)
+    other = ModalModel(poles[1:] * 2, np.array([[3 + 1j]]), np.array([[2 + 6j]]), 3 * direct)
+    plant = linear.side_by_side([linear._placed(one, (1, 3), (1, 2)), linear._placed(other, (2, 3), (0, 2))])
+    assert plant.B.tolist() == [[0.0, 1.5], [0.0, 1.0], [0.0, 2.0], [3.0, 0.0], [1.0, 0.0]]
+    assert plant.C.tolist() == [[0.0] * 5, [4.0, 6.0, 10.0, 0.0, 0.0], [0.0, 0.0, 0.0, 4.0, -12.0]]
+    assert plant.D.tolist() == [[0.0, 0.0], [0.0, 0.25], [0.75, 0.0]]
+    assert np.sort_complex(np.linalg.eigvals(plant.A)) == pytest.approx(
+        np.sort_complex([-3.0, -2 + 7j, -2 - 7j, -4 + 14j, -4 - 14j])
+    )
+    assert [v.shape for v in (plant.E, plant.F, plant.G, plant.K)] == [(5, 0), (0, 5), (0, 2), (3, 0)]
+    assert plant.name == "identified"
+
+
+def test_spectra_of_lines_are_of_the_mean_period_and_one_sided():
+    """Two periods of eight samples and a half: 3 cos at the second line and 5 sin at the third one."""
+    turn = 2 * np.pi * np.arange(20) / 8
+    own = np.column_stack([3 * np.cos(2 * turn), 5 * np.sin(3 * turn)])
+    scattered = own + np.where(np.arange(20) < 8, 0.5, -0.5)[:, None] * np.where(np.arange(20) < 16, 1.0, 99.0)[:, None]
+    given = [Recording(f"r{k}", "", k * own, (k + 1) * scattered, 80.0, ("u", "v"), ("x", "y"), 8) for k in (1, 2, 4)]
+    response = SimpleNamespace(freq_hz=np.array([20.0, 30.0]))
+    found = linear_errors.line_spectra(given, response)
+    one = np.array([[3.0, 0.0], [0.0, -5j]]) / np.sqrt(2.0)
+    np.testing.assert_allclose(found.drive, [one, 2 * one, 4 * one], atol=1e-12)
+    np.testing.assert_allclose(found.output, [2 * one, 3 * one, 5 * one], atol=1e-12)
+    assert linear_errors.line_spectra(given[:2], response) is None
+    assert linear_errors.line_spectra([*given[:2], replace(given[2], period_samples=None)], response) is None
+
+
+def test_a_long_response_is_worked_on_in_parts_that_are_it_together():
+    parts = [range(1100)[part] for part in linear_errors._parts(1100)]
+    assert [len(part) for part in parts] == [512, 512, 76]
+    assert [k for part in parts for k in part] == list(range(1100))
+
+
+def test_a_number_that_the_data_do_not_fix_has_no_part_in_the_inverse():
+    normal = np.array([[4.0, 2.0, 0.0], [2.0, 9.0, 0.0], [0.0, 0.0, 0.0]]) * 1e6
+    inverse, rank = linear_errors._inverse(normal)
+    expected = np.zeros((3, 3))
+    expected[:2, :2] = np.array([[9.0, -2.0], [-2.0, 4.0]]) / 32e6
+    np.testing.assert_allclose(inverse, expected, atol=1e-20)
+    assert rank == 2
+
+
+def test_the_fit_with_hysteresis_is_handed_on_number_by_number(monkeypatch):
+    given = {}
+    fit = SimpleNamespace(
+        order=6,
+        parameters=50,
+        redundant=7,
+        mirror="mirror",
+        delay_s=3e-4,
+        poles_rad_s=np.array([-1 + 2j]),
+        poles_error_rad_s=np.array([0.5]),
+        delay_error_s=4e-6,
+        moved=np.array([[2.0, 0.0]]),
+        names=("a", "b"),
+        converged=False,
+        iterations=9,
+    )
+    monkeypatch.setattr(
+        hysteretic, "fit_hysteretic_stiffness", lambda records, **own: given.update(own, records=records) or fit
+    )
+    found = hysteretic.hysteretic_stiffness("records", SimpleNamespace(modes="modes", delay_s=2e-4), "progress")
+    assert (found.name, found.kind, found.order) == ("hysteretic stiffness, order 6", "hysteretic stiffness", 6)
+    assert (found.parameters, found.mirror, found.delay_s, found.delay_error_s) == (43, "mirror", 3e-4, 4e-6)
+    assert (found.poles_rad_s.tolist(), found.poles_error_rad_s.tolist()) == ([-1 + 2j], [0.5 + 0j])
+    assert (found.known.parameters, found.known.standard_errors.tolist()) == (("a",), [2.0])
+    assert found.note == "the search was ended before its optimum, after 9 steps on all records"
+    assert (given["records"], given["on_progress"], given["iterations"]) == ("records", "progress", 10)
+    assert given["start"] == ("modes", 2e-4)
+    assert (given["options"].sub_steps, given["options"].few_first) == (2, 15)
+    fit.moved = None
+    assert hysteretic.hysteretic_stiffness("records", SimpleNamespace(modes=1, delay_s=0.0), None).known is None
+
+
+def test_a_mirror_file_of_angles_that_was_not_stopped_says_so_for_each_amplitude():
+    own = SimpleNamespace(
+        model=SimpleNamespace(outputs=[Output("y", "angle")]),
+        parameters=11,
+        error_share=0.2,
+        error_rms=np.array([[1e-9, np.nan], [2.34567e-6, 3e-6]]),
+    )
+    found = SimpleNamespace(
+        candidate=lambda: own,
+        chosen="m",
+        held_out=(),
+        amplitudes_v=np.array([0.123456, 3.0]),
+        stopped=False,
+        reason="it is so.",
+        warnings=(),
+        refused=[SimpleNamespace(model=k, reason=f"no {k}") for k in "ab"],
+    )
+    assert list(coupled_mirror_file._origin(found, [])) == [
+        "Mirror identified from 0 recording(s), model m.",
+        "11 parameters; error on held-out records 20 % of the output (rms).",
+        "  at 0.123 V rms: 1e-09, nan rad (rms, by output)",
+        "  at 3 V rms: 2.35e-06, 3e-06 rad (rms, by output)",
+        "Choice: it is so.",
+        "Not fitted: a, no a",
+        "Not fitted: b, no b",
+    ]
