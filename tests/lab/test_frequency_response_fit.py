@@ -11,7 +11,7 @@ import pytest
 from microrad.core import lti
 from microrad.core.units import LEAST, MOST
 from microrad.lab.identify import IdentificationError, fit_frequency_response
-from microrad.lab.identify.linear import frequency_fit
+from microrad.lab.identify.linear import frequency_fit, response_table
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.polish import FrequencyEquations, fit_outputs, normal_equations, pack, polish, unpack
@@ -548,3 +548,161 @@ def test_noise_is_not_alike_where_more_than_three_times_as_much_is_left_of_what_
     found = frequency_fit._uneven(response, np.array([*large, *small], dtype=complex).reshape(4, 1, 1))
     assert len(found) == bool(said) and said in "".join(found)
     assert frequency_fit._uneven(np.ones((4, 1, 1), dtype=complex), response) == ()
+
+
+# --------------------------------------------------------------------------------------------------- tables, in full
+def told_of(*given, form=("band-limited", None, False)):
+    with pytest.raises(IdentificationError) as caught:
+        response_table.checked(*given, form)
+    return str(caught.value)
+
+
+FIVE = np.array([1.0, 2.5, 4.0, 8.0, 9.0])
+OF_TWO = np.arange(1.0, 31.0).reshape(5, 2, 3) * (1 + 0.5j)
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (0.25, np.full((5, 2, 3), 0.25)),
+        ([1.0, 2.0, 3.0, 4.0, 5.0], np.arange(1.0, 6.0)[:, None, None] * np.ones((5, 2, 3))),
+        (OF_TWO.real, OF_TWO.real),
+        (None, None),
+    ],
+)
+def test_errors_of_a_table_are_one_for_all_or_for_each_frequency_or_for_each_value(error, expected):
+    table = response_table.checked(FIVE, OF_TWO, error, ("first-order", 19.0, True))
+    if expected is None:
+        assert table.standard_error is None
+    else:
+        np.testing.assert_array_equal(table.standard_error, expected)
+    assert (table.hold, table.rate_hz, table.direct) == ("first-order", 19.0, False)
+    assert table.response.shape == (5, 2, 3) and table.band_hz == (1.0, 9.0)
+
+
+@pytest.mark.parametrize(
+    ("freq", "values", "error", "message"),
+    [
+        (
+            spoilt(FIVE, [2, 4], np.nan),
+            OF_TWO,
+            None,
+            "frequency 3 is nan, which is not finite; leave it out.",
+        ),
+        (FIVE - 3.0, OF_TWO, None, "frequency 1 is -2 Hz, below 0; leave it out, positive ones say all."),
+        (
+            spoilt(FIVE, [1, 2], [1e-31, 1e-32]),
+            OF_TWO,
+            None,
+            "frequency 2 is 1e-31 Hz, below 1e-30; check the unit of the column.",
+        ),
+        (
+            spoilt(FIVE, 3, 4.0),
+            OF_TWO,
+            None,
+            "frequency 4, 4 Hz, does not lie above the one before it, 4 Hz; sort the table by frequency and leave "
+            "repeated ones out.",
+        ),
+        (
+            FIVE,
+            spoilt(OF_TWO, (slice(2, 4), 1, 2), np.inf),
+            None,
+            "the response at 4 Hz is not finite; leave that frequency out.",
+        ),
+        (
+            FIVE,
+            OF_TWO[:, 0],
+            None,
+            "the response has the shape (5, 3); give (frequencies,) for one element, or (frequencies, outputs, "
+            "inputs).",
+        ),
+        (
+            FIVE[:4],
+            OF_TWO,
+            None,
+            "the response has 5 rows and there are 4 frequencies; give one row for each frequency.",
+        ),
+        (FIVE, "abcde", None, "the response is no array of complex numbers; give one for each frequency."),
+        (
+            FIVE,
+            spoilt(OF_TWO, (4, 1, 2), 2e30j),
+            None,
+            "the response has a magnitude below 1e-30 or above 1e+30, and none has that in SI units; check its unit.",
+        ),
+        (
+            FIVE,
+            OF_TWO,
+            spoilt(OF_TWO.real, ([1, 3], [1, 0], [2, 1]), [-0.5, -7.0]),
+            "the standard error at 2.5 Hz is -0.5; each must be above 0: leave out what was not measured, or give a "
+            "large error.",
+        ),
+        (
+            FIVE,
+            OF_TWO,
+            spoilt(OF_TWO.real, (3, 0, 1), np.nan),
+            "the standard error at 8 Hz is not finite; leave that frequency out.",
+        ),
+        (
+            FIVE,
+            OF_TWO,
+            np.ones((5, 3, 2)),
+            "the standard errors have the shape (5, 3, 2), the response (5, 2, 3); give that shape, or one for each "
+            "frequency, (5,), or one for all.",
+        ),
+    ],
+)
+def test_a_fault_of_a_table_of_several_elements_is_told_in_full_at_the_first_place(freq, values, error, message):
+    assert told_of(freq, values, error) == message
+
+
+@pytest.mark.parametrize(
+    ("form", "message"),
+    [
+        (
+            ("zero-order", 18.0, False),
+            "the table reaches 9 Hz, half the sample rate of 18 Hz or more; leave that out.",
+        ),
+        (("zero-order", -18.5, False), "the sample rate is -18.5 Hz; give a rate above 0."),
+        (("first-order", None, False), "a first-order hold needs the sample rate; give rate_hz."),
+        (
+            ("first", 20.0, False),
+            "hold 'first' is not known; use zero-order, first-order or band-limited.",
+        ),
+    ],
+)
+def test_a_hold_and_a_rate_that_a_table_cannot_have_are_told_in_full(form, message):
+    assert told_of(FIVE, OF_TWO, None, form=form) == message
+
+
+@pytest.mark.parametrize(
+    ("proper", "delay", "order", "numbers", "most"),
+    [(False, False, 4, 26, 4), (False, True, 10, 57, 4), (True, False, 5, 25, 4), (True, True, 6, 31, 4)],
+)
+def test_a_table_of_two_by_three_fixes_as_many_numbers_as_its_model_has(proper, delay, order, numbers, most):
+    """Five for each state, six for a direct term, one for a delay; of sixty values one is to spare."""
+    table = response_table.checked(FIVE, OF_TWO, None, ("band-limited", None, proper))
+    assert table.parameters(order, delay) == numbers and table.most == most
+    response_table.check_numbers(table, order, delay)
+    short = table._replace(response=table.response[:2], freq_hz=FIVE[:2])
+    with pytest.raises(IdentificationError) as caught:
+        response_table.check_numbers(short, order, delay)
+    assert str(caught.value) == (
+        f"a model of order {order} has {numbers} numbers, and 2 frequencies give 24 real values; give more frequencies "
+        "or a lower order."
+    )
+
+
+def test_a_table_of_one_element_and_ten_frequencies_has_no_order_of_ten():
+    """Of 20 values: nine states and a delay have 19 numbers, and a direct term one more."""
+    freq = np.arange(1.0, 11.0)
+    assert response_table.checked(freq, freq, None, ("band-limited", None, True)).most == 9
+    assert response_table.checked(freq, freq, None, ("band-limited", None, False)).most == 8
+    assert response_table.checked(freq[:1], freq[:1], None, ("band-limited", None, True)).most == 1
+
+
+def test_the_rows_of_a_table_are_turned_back_by_the_delay_and_weighed_by_its_errors():
+    table = response_table.checked(FIVE, OF_TWO, OF_TWO.real, ("zero-order", 30.0, True))
+    own = table.equations(0.02)
+    np.testing.assert_allclose(own.response, OF_TWO * np.exp(2j * np.pi * FIVE * 0.02)[:, None, None])
+    assert (own.hold, own.rate_hz, own.direct) == ("zero-order", 30.0, False)
+    np.testing.assert_allclose(own.weight[:, :5], 2.0 / OF_TWO.real.reshape(5, 6).T ** 2)

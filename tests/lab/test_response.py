@@ -2,11 +2,13 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from microrad.core import lti
+from microrad.lab.identify.linear import response
 from microrad.lab.identify.linear.modal import order_modes, simulate
 from microrad.lab.identify.linear.response import (
     measure_frequency_response,
@@ -296,3 +298,199 @@ def test_the_last_line_of_a_period_of_odd_length_is_no_half_of_the_rate(samples,
     found = response_from_periods([recording(drive, 2.0 * np.roll(drive, 1), samples)])
     np.testing.assert_allclose(found.freq_hz, np.arange(1, last + 1) * RATE_HZ / samples)
     np.testing.assert_allclose(found.response[:, 0, 0], 2.0 * np.exp(-2j * np.pi * found.freq_hz / RATE_HZ))
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def told(function, *given, **words):
+    with pytest.raises(IdentificationError) as caught:
+        function(*given, **words)
+    return str(caught.value)
+
+
+def drawn(samples, inputs, outputs, seed, *, rate_hz=640.0, period=None, name="r"):
+    """A record of noise; every number its own."""
+    drive, output = (
+        philox(seed).standard_normal((samples, inputs)),
+        philox(seed + 50).standard_normal((samples, outputs)),
+    )
+    return recording(drive, output, period, rate_hz, name)
+
+
+def test_the_third_record_may_differ_in_its_rate_or_in_the_number_of_its_outputs_alone():
+    first, second = drawn(40, 2, 3, 1, name="a"), drawn(40, 2, 3, 2, name="b")
+    other = drawn(40, 2, 3, 3, rate_hz=640.5, name="c")
+    assert told(response.check_alike, [first, second, other], "judged") == (
+        "c: the sample rate is 640.5 Hz and that of a 640 Hz; records that are judged together must share one rate."
+    )
+    assert told(response.check_alike, [first, second, drawn(40, 2, 1, 3, name="c")], "judged") == (
+        "c: 2 inputs and 1 outputs, where a has 2 and 3; choose the same channels in each record."
+    )
+    assert response.check_alike([first, second], "judged") is None
+
+
+@pytest.mark.parametrize("skip", [0, 1])
+def test_lines_of_two_drives_are_solved_over_three_realisations_of_unlike_length(skip):
+    """By the pseudo-inverse of each line, over the periods that all records have."""
+    records = [drawn(n, 2, 2, seed, period=16) for n, seed in ((64, 1), (70, 2), (48, 3), (64, 4))]
+    found = response_from_periods(records, skip_periods=skip)
+    periods = 3 - skip
+    parts = [slice(16 * p, 16 * p + 16) for p in range(skip, 3)]
+    drive, output = (
+        np.array([[np.fft.rfft(getattr(r, of)[part], axis=0) for part in parts] for r in records]) * np.sqrt(2.0) / 16
+        for of in ("drive", "output")
+    )
+    assert found.freq_hz.tolist() == [40.0 * k for k in range(1, 8)]
+    assert found.method == f"best linear approximation, realisations: 4, periods of each: {periods}"
+    assert found.excited_hz == (40.0, 280.0) and (found.rate_hz, found.hold) == (640.0, "zero-order")
+    u, y = drive.mean(axis=1), output.mean(axis=1)
+    for at, line in enumerate(range(1, 8)):
+        gain = (np.linalg.pinv(u[:, line]) @ y[:, line]).T
+        np.testing.assert_allclose(found.response[at], gain, rtol=1e-9)
+        left = y[:, line] - u[:, line] @ gain.T
+        variance = np.sum(np.abs(left) ** 2, axis=0) / 2
+        auto = u[:, line].T @ u[:, line].conj()
+        spread = np.diag(np.linalg.inv(auto)).real
+        np.testing.assert_allclose(found.standard_error[at], np.sqrt(np.outer(variance, spread)), rtol=1e-9)
+        np.testing.assert_allclose(found.residual_power[at], variance, rtol=1e-9)
+        np.testing.assert_allclose(found.drive_power[at], auto / 4, rtol=1e-9)
+        coherence = 1 - 4 * variance / np.sum(np.abs(y[:, line]) ** 2, axis=0)
+        np.testing.assert_allclose(found.coherence[at], np.clip(coherence, 0, 1), rtol=1e-9)
+        rest = output[:, :, line] - drive[:, :, line] @ gain.T
+        noise = np.mean(np.var(rest, axis=1, ddof=1), axis=0) / periods
+        np.testing.assert_allclose(found.noise_standard_error[at], np.sqrt(np.outer(noise, spread)), rtol=1e-9)
+    distortion = np.maximum(found.standard_error**2 - found.noise_standard_error**2, 0)
+    np.testing.assert_allclose(found.distortion_standard_error, np.sqrt(distortion), rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(found.drive_rms, np.sqrt(np.mean([r.drive.var(axis=0) for r in records], axis=0)))
+
+
+def test_one_period_of_more_realisations_than_drives_tells_no_noise():
+    found = response_from_periods([drawn(16, 2, 1, seed, period=16) for seed in (1, 2, 3)])
+    assert found.noise_standard_error is None and found.distortion_standard_error is None
+    assert (found.standard_error > 0).all()
+
+
+def test_bands_of_two_drives_are_solved_over_both_records():
+    records = [drawn(400, 2, 2, seed) for seed in (1, 2)]
+    found = response_from_records(records, band_hz=(20.0, 200.0), bands=4, detrend=False)
+    marks = np.round(np.geomspace(20.0, 200.0, 5) / 1.6).astype(int)
+    spectra = [
+        [np.fft.rfft(v - v.mean(axis=0), axis=0) * np.sqrt(2.0) / 400 for v in (r.drive, r.output)] for r in records
+    ]
+    for at, (begin, end) in enumerate(pairwise(marks)):
+        u, y = (np.vstack([each[k][begin:end] for each in spectra]) for k in (0, 1))
+        gain = (np.linalg.pinv(u) @ y).T
+        np.testing.assert_allclose(found.response[at], gain, rtol=1e-9)
+        left = np.sum(np.abs(y - u @ gain.T) ** 2, axis=0)
+        variance = left / (2 * (end - begin) - 2)
+        spread = np.diag(np.linalg.inv(u.T @ u.conj())).real
+        np.testing.assert_allclose(found.standard_error[at], np.sqrt(np.outer(variance, spread)), rtol=1e-9)
+        np.testing.assert_allclose(found.residual_power[at], variance * (end - begin), rtol=1e-9)
+        np.testing.assert_allclose(found.coherence[at], 1 - left / np.sum(np.abs(y) ** 2, axis=0), rtol=1e-9)
+        np.testing.assert_allclose(found.drive_power[at], u.T @ u.conj() / 2, rtol=1e-9)
+        weights = np.sum(np.abs(u) ** 2, axis=1)
+        freq = 1.6 * np.concatenate([np.arange(begin, end)] * 2)
+        assert found.freq_hz[at] == pytest.approx(weights @ freq / weights.sum())
+    assert found.excited_hz == pytest.approx((1.6 * marks[0], 1.6 * (marks[-1] - 1)))
+    assert found.method == "band-averaged cross-spectrum"
+
+
+def test_each_record_has_a_slope_of_its_own_in_each_output():
+    """Outputs that are gains of the drives, and ramps on them."""
+    gains, slopes = np.array([[2.0, -1.0], [0.5, 3.0], [1.0, 4.0]]), np.array([[0.1, -0.2, 0.3], [-0.4, 0.5, 0.6]])
+    line = np.linspace(-1.0, 1.0, 500)[:, None]
+    records = []
+    for k, slope in enumerate(slopes):
+        drive = drawn(500, 2, 3, k).drive
+        records.append(recording(drive, drive @ gains.T + line * slope + 7.0, rate_hz=640.0))
+    found = response_from_records(records, band_hz=(5.0, 300.0), bands=6)
+    np.testing.assert_allclose(found.response, np.broadcast_to(gains, found.response.shape), atol=1e-9)
+    spectra = response._transform(records, [r.output for r in records])
+    edges = response._band_edges(spectra.freq_hz, 5.0, 300.0, 6, 8)
+    np.testing.assert_allclose(response._unexplained_slopes(spectra, edges, 500), slopes, rtol=1e-9)
+
+
+def test_bands_too_narrow_for_their_lines_are_joined_to_the_next():
+    freq = 0.5 * np.arange(1001)
+    marks = [20, 37, 68, 126, 234, 433, 800]
+    assert np.round(np.geomspace(10.0, 400.0, 7) / 0.5).astype(int).tolist() == marks
+    assert response._band_edges(freq, 10.0, 400.0, 6, 50) == [(20, 126), (126, 234), (234, 433), (433, 800)]
+    assert response._band_edges(freq, 10.0, 400.0, 6, 17)[0] == (20, 37)
+    assert response._band_edges(freq, 0.1, 900.0, 2, 17) == [(1, 19), (19, 1000)]  # never 0 nor half the rate
+    assert told(response._band_edges, freq, 10.0, 400.0, 6, 781) == (
+        "the record is too short for the band 10 to 400 Hz: it resolves 0.5 Hz, which leaves fewer than 781 lines; "
+        "record longer."
+    )
+
+
+def test_the_drive_and_the_frequency_that_are_not_excited_are_named():
+    auto = np.tile(np.diag([2.0, 3.0, 4.0]).astype(complex), (4, 1, 1))
+    freq = np.array([10.0, 20.0, 30.5, 40.0])
+    np.testing.assert_allclose(response._independent(auto, freq), np.tile(np.diag([1 / 2, 1 / 3, 1 / 4]), (4, 1, 1)))
+    still = auto.copy()
+    still[2, 1, 1] = still[3, 0, 0] = 0.0
+    assert told(response._independent, still, freq) == (
+        "input 1 is not excited at 30.5 Hz; narrow the band or excite it there."
+    )
+    alike = auto.copy()
+    alike[1:] += 2.44948974 * np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0]])
+    alike[2] = np.diag([2.0, 3.0, 4.0]) + np.sqrt(6.0) * np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0]])
+    assert told(response._independent, alike, freq) == (
+        "the 3 inputs are not driven independently at 30.5 Hz and most other frequencies, so their responses cannot be "
+        "told apart; give at least 3 records with drives that differ (one input at a time, or orthogonal multisines)."
+    )
+    one = auto.copy()
+    one[2] = alike[2]
+    assert response._independent(one, freq).shape == (4, 3, 3)  # a single line that agrees is kept
+
+
+def test_lines_are_excited_from_a_thousandth_of_the_strongest_drive_on():
+    """Of the mean over realisations and periods, in the drive that has most of it; never 0, nor half the rate."""
+    drive = np.zeros((2, 1, 9, 2), dtype=complex)
+    drive[0, 0, 3, 0] = 10.0
+    drive[:, 0, 5, 1] = np.sqrt(0.051)
+    drive[:, 0, 6, 1] = np.sqrt(0.049)
+    drive[:, 0, [0, 8]] = 99.0
+    assert response._excited_lines(drive).tolist() == [3, 5]
+    assert told(response._excited_lines, 0 * drive) == (
+        "no drive changes in any record, so there is no response; excite the mirror."
+    )
+
+
+def test_periods_that_are_missing_or_too_few_are_told_in_full():
+    records = [drawn(70, 1, 1, seed, period=16, name=name) for seed, name in ((1, "a"), (2, "b"), (3, "c"))]
+    bare = replace(records[2], period_samples=None)
+    assert told(response_from_periods, [*records[:2], bare]) == (
+        "c: the record has no period; give period_samples or treat it as not periodic."
+    )
+    others = [replace(r, period_samples=n) for r, n in zip(records, (32, 8, 16), strict=True)]
+    assert told(response_from_periods, others) == "the records have periods of [8, 16, 32] samples; they must agree."
+    assert told(response_from_periods, records, skip_periods=4) == (
+        "a: 70 samples hold 4 periods of 16, and 4 are to be dropped as transient; drop none or more and keep at least "
+        "one, or record more periods."
+    )
+    two = [drawn(40, 2, 1, seed, period=32) for seed in (1, 2)]
+    assert told(response_from_periods, two) == (
+        "2 records of one usable period for 2 inputs leave nothing to estimate the confidence from; give more "
+        "realisations or more periods."
+    )
+    three = [drawn(64, 3, 1, seed, period=32) for seed in (1, 2)]
+    assert told(response_from_periods, three) == (
+        "2 records for 3 inputs: at least 3 realisations with different drives are needed."
+    )
+
+
+def test_a_band_of_periodic_records_has_its_lines_of_everything():
+    records = [drawn(64, 2, 1, seed, period=16) for seed in (1, 2, 3)]
+    whole, cut = (measure_frequency_response(records, band_hz=band) for band in (None, (80.0, 200.0)))
+    assert cut.freq_hz.tolist() == [80.0, 120.0, 160.0, 200.0]
+    for name in ("response", "standard_error", "noise_standard_error", "distortion_standard_error", "coherence"):
+        np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name)[1:5])
+    for name in ("drive_power", "residual_power"):
+        np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name)[1:5])
+    assert cut.drive_rms.shape == (2,) and cut.input_names == ("u0", "u1")
+    assert told(measure_frequency_response, records, band_hz=(81.0, 119.5)) == (
+        "no excited line lies between 81 and 119.5 Hz; widen the band."
+    )
+    assert told(measure_frequency_response, [*records, drawn(64, 2, 1, 4)]) == (
+        "some recordings state their period and others do not; measure each kind by itself, or state it for all."
+    )
