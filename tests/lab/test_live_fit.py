@@ -79,3 +79,27 @@ def test_a_fit_is_added_to_the_file_beside_the_progress_and_nowhere_without_one(
     assert first == second and '"model": "plays"' in first
     live_fit.live_fit_writer(str(tmp_path / "missing" / "progress"))(judged())
     assert not Path(tmp_path / "missing").exists()
+
+
+def test_digits_of_a_curve_are_seven():
+    assert live_fit._digits([1.23456789, -0.00012345678]) == (1.234568, -0.0001234568)
+
+
+def test_a_drive_about_a_large_bias_has_its_own_period_and_a_long_one_is_thinned():
+    """Of 4000 samples in 4 periods the last 2000, of which 600 are shown."""
+    of = judged(4, samples=4000, start=100, split=3000)
+    of.recordings[0].drive[:] += 1000.0
+    (loop,) = live_fit.thin_fit(of).loops
+    rows = np.unique(np.linspace(2000, 3999, 600).astype(int))
+    assert loop.drive == pytest.approx(of.recordings[0].drive[rows, 0], rel=1e-6)
+    assert loop.model_rad == pytest.approx(of.predictions[0].model_rad[rows], rel=1e-6)
+    assert (loop.time_s[0], loop.time_s[-1]) == pytest.approx((1.0, 39.99))
+    assert (loop.residual_rad[0], loop.residual_rad[-1]) == pytest.approx((0.1, 3.999))
+    assert 500 < len(loop.time_s) == len(loop.residual_rad) <= 602 and loop.split_s == pytest.approx(30.0)
+
+
+def test_extremes_of_two_columns_are_those_of_either():
+    one, other = np.zeros(40), np.zeros(40)
+    one[[3, 25]], other[[6, 33]] = (5.0, -5.0), (-4.0, 4.0)
+    assert {3, 6, 25, 33} <= {*live_fit.extremes([one, other], 4).tolist()}
+    assert live_fit.extremes([one, other], 4).tolist() == [0, 3, 6, 20, 25, 33, 39]

@@ -172,3 +172,139 @@ def test_an_unseen_record_of_which_half_is_not_judged_is_told():
     (told,) = [w for w in found.warnings if "are not judged" in w]
     assert "the first 4000 of 8000 samples" in told
     assert not any("set aside" in w for w in found.warnings)
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def told(function, *given, **words):
+    with pytest.raises(IdentificationError) as caught:
+        function(*given, **words)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        (("kV", "deg"), "input unit 'kV' is not known; use one of V, mV."),
+        (
+            ("mV", "deg", 0.1),
+            "output unit 'deg' is not known; use an angle (rad, mrad, urad) or a length (m, mm, um) with its lever arm.",
+        ),
+        (
+            ("mV", "mm"),
+            "the output is a length (mm) and a mirror model needs an angle: give the lever arm (--lever-arm, "
+            "lever_arm_m), the distance in metres from the axis of rotation to the point measured (tilt = displacement "
+            "/ lever arm).",
+        ),
+        (("V", "urad", -0.5), "the lever arm is -0.5 m; give a positive length in metres."),
+        (
+            ("V", "urad", 0.025),
+            "a lever arm of 0.025 m was given for an output that is already an angle (urad); leave the lever arm out, "
+            "or name the unit of length.",
+        ),
+    ],
+)
+def test_a_unit_that_cannot_be_used_is_told_in_full(units, message):
+    assert told(Units, *units) == message
+
+
+@pytest.mark.parametrize(
+    ("units", "volts", "radians"),
+    [
+        (("V", "rad"), 1.0, 1.0),
+        (("mV", "mrad"), 1e-3, 1e-3),
+        (("V", "urad"), 1.0, 1e-6),
+        (("mV", "m", 0.4), 1e-3, 2.5),
+        (("V", "mm", 0.05), 1.0, 0.02),
+        (("V", "um", 8.0), 1.0, 1.25e-7),
+    ],
+)
+def test_each_unit_has_its_size_in_volts_and_radians(units, volts, radians):
+    own = Units(*units)
+    assert (own.volts, own.radians) == pytest.approx((volts, radians), rel=1e-12)
+
+
+def of(drive, output, rate_hz=50.0, name="r"):
+    columns = (np.asarray(v, dtype=float).reshape(len(v), -1) for v in (drive, output))
+    return records.Recording(name, f"sha of {name}", *columns, rate_hz, ("u",), ("y",))
+
+
+WAVE = np.sin(2 * np.pi * np.arange(247) / 60.0)
+
+
+def test_records_in_volts_and_radians_keep_their_name_and_lose_a_twentieth():
+    one, other = si_records(
+        [of(WAVE, 3 * WAVE, name="a"), of(2 * WAVE[:199], WAVE[:199], 25.0, "b")], Units("mV", "um", 0.5)
+    )
+    assert (one.name, one.sha256, one.step_s, one.start, one.used) == ("a", "sha of a", 0.02, 12, 235)
+    assert (other.name, other.sha256, other.step_s, other.start, other.used) == ("b", "sha of b", 0.04, 9, 190)
+    np.testing.assert_allclose(one.drive_v, 1e-3 * WAVE)
+    np.testing.assert_allclose(one.output_rad, 6e-6 * WAVE)
+    thin = one.every(5)
+    assert (thin.step_s, thin.start, thin.used, thin.name) == (pytest.approx(0.1), 3, 47, "a")
+    np.testing.assert_array_equal(thin.output_rad, one.output_rad[::5])
+    np.testing.assert_array_equal(thin.drive_v, one.drive_v[::5])
+    assert records.span([other, one]) == pytest.approx(6e-6 * np.ptp(WAVE))
+
+
+@pytest.mark.parametrize(
+    ("drive", "output", "message"),
+    [
+        (
+            np.ones((40, 3)),
+            np.ones((40, 2)),
+            "r: 3 drives and 2 outputs; one of each is identified here: choose one column, or identify all of them with "
+            "coupled.identify_coupled.",
+        ),
+        (WAVE, 0 * WAVE + 4.0, "r: drive or output is constant in the part that is fitted."),
+        (
+            np.arange(40.0),
+            np.arange(40.0),
+            "r: the drive never reverses in the part that is fitted, and hysteresis shows only behind a reversal; "
+            "record at least one full period of the drive.",
+        ),
+    ],
+)
+def test_the_second_of_two_records_that_cannot_be_used_is_told_in_full(drive, output, message):
+    assert told(si_records, [of(WAVE, WAVE, name="good"), of(drive, output)], Units()) == message
+
+
+def test_of_a_sweep_the_fastest_tenth_of_its_travel_counts_whichever_way_it_goes():
+    """A hundred samples of 1 V each, twenty of 5 V, and fifty of 2 V: the tenth of 300 V goes fastest in six."""
+    sweep = np.concatenate([[0.0], np.cumsum(np.repeat([1.0, 5.0, 2.0], [100, 20, 50]))])
+    for each in (sweep, -sweep, 7.0 - 3 * sweep):
+        volts, samples = records._fastest_tenth(each)
+        assert volts == pytest.approx(30.0 * np.ptp(each) / 300.0) and samples == 6
+
+
+def test_rates_of_sweeps_leave_out_short_ones_and_the_steepest():
+    """Triangles: up 10 V in 100 samples, down 10 V in 50, up 1 V in 10 (short), down 1 V, up 10 V in 25, down in 200."""
+    corners = np.cumsum([0, 100, 50, 10, 10, 25, 200])
+    drive = np.interp(np.arange(396), corners, [0.0, 10.0, 0.0, 1.0, 0.0, 10.0, 0.0])
+    assert [samples for _, samples in records._sweeps(drive)] == pytest.approx([5, 3], abs=1)
+    rates = records._sweep_rates(drive, 0.5)
+    assert rates == pytest.approx([0.4, 0.8], rel=0.05)
+
+
+def test_the_range_swept_and_where_95_per_cent_of_it_are():
+    drive = np.array(
+        [5.0, 6.0, 4.0, 4.0, 10.0, 9.0, 24.0, 23.0, 25.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 9.0]
+    )
+    assert records._swept(drive).tolist() == [0, 1, 2, 2, 6, 6, 20, 20, 21, *[25] * 11]
+    assert records.transient(drive) == 10
+    assert records.transient(drive[:9]) == 4  # no more than half
+    assert records.transient(np.array([0.0, 19.0, 20.0, 0.0, 0.0, 0.0])) == 2
+    ramps = memory(drive, 5)
+    assert ramps[4].tolist() == [1.0] * 8 and ramps[9].tolist() == [1.0] * 8
+    assert ramps[2] == pytest.approx([1.0, 1.0, 2.0 / 0.75 - 2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_rates_over_two_records_are_the_slowest_and_the_fastest_of_either():
+    slow, fast = (
+        of(amplitude * np.sin(2 * np.pi * f * np.arange(4000) / 1000.0), np.sin(np.arange(4000)), 1000.0)
+        for amplitude, f in ((2.0, 1.0), (3.0, 4.0))
+    )
+    both = si_records([fast, slow], Units())
+    peaks = 2 * np.pi * np.array([2.0, 12.0])
+    assert loop_rates(both) == pytest.approx(peaks, rel=0.01)
+    assert fastest_rate(both) == fastest_rate(both[::-1]) == pytest.approx(peaks[1], rel=0.01)
+    assert not records.one_rate_only(both) and records.one_rate_only(both[:1])

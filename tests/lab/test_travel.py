@@ -67,3 +67,22 @@ def test_identify_refuses_an_absurd_unit_at_once():
     one = recording_from_arrays(WAVE, 0.3 * WAVE, 1000.0, "loop.csv")
     with pytest.raises(IdentificationError, match=r"loop\.csv: the output 'output' moves by 3 rad, a tilt of 3 rad"):
         identify([one], output_unit="rad")
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "options", "words"),
+    [
+        ("rad", 3.0, {}, "3 rad, a tilt of 3 rad"),
+        ("urad", 2.5e6, {}, "2.5e+06 urad, a tilt of 2.5 rad"),
+        ("m", 7.5, {"lever_arm_m": 3.2}, "7.5 m over 3.2 m, a tilt of 2.344 rad"),
+        ("um", 123456.0, {"positions_m": [(0.0, 0.03), (0.04, 0.0)]}, "1.235e+05 um over 50 mm, a tilt of 2.469 rad"),
+    ],
+)
+def test_a_travel_beyond_a_quarter_turn_is_told_in_full(unit, size, options, words):
+    over = " or what it stands over (--lever-arm, --position)" if options else ""
+    with pytest.raises(IdentificationError) as caught:
+        check_travel([recorded(size)], unit, **options)
+    assert str(caught.value) == (
+        f"loop.csv: the output 'output 1' moves by {words}, and no mirror turns by more than 1.571 rad (a quarter "
+        f"turn); correct the unit of the output (--output-unit, output_unit){over}."
+    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from microrad.lab.identify import IdentificationError
+from microrad.lab.identify.coupled import wiring
 from microrad.lab.identify.coupled.wiring import check_wiring
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods
 from microrad.lab.recording import AXES, read_arrays
@@ -192,3 +193,83 @@ def test_positions_of_displacements_that_are_known_in_part_or_of_angles_are_refu
     told = refusal(made(GAIN), None, [placed_at(PLACES)[0], angle])
     assert "positions are those of displacements, and the outputs are angles" in told
     assert "the positions do not give the tilts" in refusal(made(GAIN), None, placed_at(PLACES)[:2])
+
+
+# -------------------------------------------------------------------------------------- three outputs of four drives
+WIDE = ((2.0, -1.0, 0.5, 3.0), (1.5, 4.0, -2.5, 0.25), (-3.5, 0.75, 1.25, 5.0))
+ALL_OF_THEM = np.sign(WIDE).astype(int)
+THREE = [Output(f"y{k}", "displacement") for k in range(3)]
+
+
+def swapped(axis, a, b):
+    order = list(range(np.shape(WIDE)[axis]))
+    order[a], order[b] = b, a
+    return np.take(ALL_OF_THEM, order, axis=axis)
+
+
+@pytest.mark.parametrize(
+    ("signs", "contradicts", "advice"),
+    [
+        (
+            swapped(0, 0, 2),
+            "the output 'y2' falls with the drive 'u0'",
+            "it would agree where the outputs 'y0' and 'y2' are swapped or the inputs 'u0' and 'u1' are swapped",
+        ),
+        (
+            swapped(1, 1, 3),
+            "the output 'y0' rises with the drive 'u3'",
+            "it would agree where the inputs 'u1' and 'u3' are swapped",
+        ),
+        (
+            np.where(np.arange(3)[:, None] == 1, 0, ALL_OF_THEM) * [[1], [1], [-1]],
+            "the output 'y2' rises with the drive 'u3'",
+            "it would agree where the output 'y2' is reversed",
+        ),
+        (
+            -ALL_OF_THEM,
+            "the output 'y2' rises with the drive 'u3'",
+            "no single sensor reversed or pair of channels swapped explains it",
+        ),
+    ],
+)
+def test_the_channel_that_is_wired_wrongly_among_four_drives_and_three_outputs(signs, contradicts, advice):
+    assert refusal(made(WIDE), signs, THREE) == (
+        f"u.npy: at low frequency {contradicts}, and `signs` says that it does not; {advice}: check the wiring, or "
+        "correct signs."
+    )
+
+
+def test_of_unlike_errors_the_most_certain_contradiction_is_named():
+    """The larger response is known worse."""
+    errors = np.full((20, 2, 2), 0.01)
+    errors[:, 1, 0] = 0.3
+    response = replace(made(GAIN), standard_error=errors)
+    assert refusal(response, ((-1, 0), (1, 0)), TWO) == (
+        "u.npy: at low frequency the output 'y0' rises with the drive 'u0', and `signs` says that it does not; it "
+        "would agree where the outputs 'y0' and 'y1' are swapped: check the wiring, or correct signs."
+    )
+
+
+def test_no_more_than_three_ways_are_told():
+    """Of one output each reversed or swapped channel explains it: of four drives there are six pairs, and it."""
+    told = refusal(made(((1.0, 2.0, 3.0, -4.0),)), ((1, 1, -1, 1),), TWO[:1])
+    assert told == (
+        "u.npy: at low frequency the output 'y0' falls with the drive 'u3', and `signs` says that it does not; it "
+        "would agree where the inputs 'u2' and 'u3' are swapped: check the wiring, or correct signs."
+    )
+    told = refusal(made(((1.0, 2.0, 3.0, -4.0),)), ((1, 0, 0, 1),), TWO[:1])
+    assert "where the inputs 'u1' and 'u3' are swapped or the inputs 'u2' and 'u3' are swapped: check" in told
+    told = refusal(made(((-1.0, 2.0, 3.0, 4.0),)), ((1, 0, 0, 0),), TWO[:1])
+    assert (
+        "where the output 'y0' is reversed or the inputs 'u0' and 'u1' are swapped or the inputs 'u0' and 'u2'" in told
+    )
+    assert "'u3'" not in told
+
+
+def test_the_gain_at_low_frequency_is_of_ten_lines_or_of_all_where_there_are_fewer():
+    response = made(GAIN, error=0.3, lines=12)
+    turned = response.response * np.where(np.arange(12) < 10, np.exp(0.5j), 9.0)[:, None, None]
+    gain, error = wiring._at_low_frequency(replace(response, response=turned))
+    np.testing.assert_allclose(gain, np.cos(0.5) * np.array(GAIN))
+    np.testing.assert_allclose(error, np.full((2, 2), 0.3 / np.sqrt(10.0)))
+    np.testing.assert_allclose(wiring._at_low_frequency(made(GAIN, error=0.3, lines=4))[1], np.full((2, 2), 0.15))
