@@ -187,7 +187,8 @@ def told(function, *given, **words):
         (("kV", "deg"), "input unit 'kV' is not known; use one of V, mV."),
         (
             ("mV", "deg", 0.1),
-            "output unit 'deg' is not known; use an angle (rad, mrad, urad) or a length (m, mm, um) with its lever arm.",
+            "output unit 'deg' is not known; use an angle (rad, mrad, urad) or a length (m, mm, um) with its lever "
+            "arm.",
         ),
         (
             ("mV", "mm"),
@@ -252,8 +253,8 @@ def test_records_in_volts_and_radians_keep_their_name_and_lose_a_twentieth():
         (
             np.ones((40, 3)),
             np.ones((40, 2)),
-            "r: 3 drives and 2 outputs; one of each is identified here: choose one column, or identify all of them with "
-            "coupled.identify_coupled.",
+            "r: 3 drives and 2 outputs; one of each is identified here: choose one column, or identify all of them "
+            "with coupled.identify_coupled.",
         ),
         (WAVE, 0 * WAVE + 4.0, "r: drive or output is constant in the part that is fitted."),
         (
@@ -277,7 +278,7 @@ def test_of_a_sweep_the_fastest_tenth_of_its_travel_counts_whichever_way_it_goes
 
 
 def test_rates_of_sweeps_leave_out_short_ones_and_the_steepest():
-    """Triangles: up 10 V in 100 samples, down 10 V in 50, up 1 V in 10 (short), down 1 V, up 10 V in 25, down in 200."""
+    """Triangles of 10 V with one of 1 V between them; what lies before the first and behind the last turn is none."""
     corners = np.cumsum([0, 100, 50, 10, 10, 25, 200])
     drive = np.interp(np.arange(396), corners, [0.0, 10.0, 0.0, 1.0, 0.0, 10.0, 0.0])
     assert [samples for _, samples in records._sweeps(drive)] == pytest.approx([5, 3], abs=1)
@@ -286,9 +287,7 @@ def test_rates_of_sweeps_leave_out_short_ones_and_the_steepest():
 
 
 def test_the_range_swept_and_where_95_per_cent_of_it_are():
-    drive = np.array(
-        [5.0, 6.0, 4.0, 4.0, 10.0, 9.0, 24.0, 23.0, 25.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 9.0]
-    )
+    drive = np.array([5.0, 6.0, 4.0, 4.0, 10.0, 9.0, 24.0, 23.0, 25.0, *np.arange(10.0), 9.0])
     assert records._swept(drive).tolist() == [0, 1, 2, 2, 6, 6, 20, 20, 21, *[25] * 11]
     assert records.transient(drive) == 10
     assert records.transient(drive[:9]) == 4  # no more than half
@@ -299,10 +298,8 @@ def test_the_range_swept_and_where_95_per_cent_of_it_are():
 
 
 def test_rates_over_two_records_are_the_slowest_and_the_fastest_of_either():
-    slow, fast = (
-        of(amplitude * np.sin(2 * np.pi * f * np.arange(4000) / 1000.0), np.sin(np.arange(4000)), 1000.0)
-        for amplitude, f in ((2.0, 1.0), (3.0, 4.0))
-    )
+    time = np.arange(4000) / 1000.0
+    slow, fast = (of(a * np.sin(2 * np.pi * f * time), time**2, 1000.0) for a, f in ((2.0, 1.0), (3.0, 4.0)))
     both = si_records([fast, slow], Units())
     peaks = 2 * np.pi * np.array([2.0, 12.0])
     assert loop_rates(both) == pytest.approx(peaks, rel=0.01)
