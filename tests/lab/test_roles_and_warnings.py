@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from scipy.signal import lfilter
 
 import truths
 from microrad.lab.identify import FORMS, IdentificationError, JointFit, Units, identify
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.records import si_records
 from microrad.lab.identify.selection import roles as selection_roles
 from microrad.lab.identify.selection import warnings
@@ -18,6 +21,7 @@ from microrad.lab.identify.selection.predictions import Prediction, Score
 from microrad.lab.identify.selection.roles import is_broadband, roles, single_period, whole_periods
 from microrad.lab.identify.selection.warnings import ResidualTest, residual_test, residual_warnings
 from microrad.lab.recording import Recording
+from microrad.mirror.hysteresis import BoucWen
 from truths import philox
 
 TIME = np.arange(8000) / 2000.0
@@ -345,3 +349,194 @@ def test_a_search_that_did_not_settle_is_told():
     cut = replace(fit, fit=replace(fit.fit, converged=False, evaluations=60))
     assert "stopped after 60 evaluations" in warnings.fit_warnings(cut)[0]
     assert_array_equal(warnings.fit_warnings(fit), [])
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def told(function, *given, **words):
+    with pytest.raises(IdentificationError) as caught:
+        function(*given, **words)
+    return str(caught.value)
+
+
+def test_a_role_that_cannot_be_is_told_in_full_for_the_second_of_two_records():
+    good, sine = (
+        replace(recording(WIDE["noise"]), role="broadband"),
+        replace(recording(SINE, name="b"), role="broadband"),
+    )
+    assert told(roles, [good, sine]) == (
+        "b: its role is broadband and its drive is a sine, of which a linear part cannot be told; give it the role "
+        "loops, or leave the role out."
+    )
+    assert told(roles, [good, replace(good, path="c")]) == (
+        "record: every recording has the role broadband, and none is left for the hysteresis; leave the role of one "
+        "with a large drive out."
+    )
+
+
+def test_records_for_validation_are_those_given_and_then_those_that_say_so():
+    given = [
+        replace(recording(SINE, name=name), role=role)
+        for name, role in (("a", ""), ("b", "validation"), ("c", "loops"))
+    ]
+    beside = [recording(SINE, name="d"), replace(recording(SINE, name="e"), role="validation")]
+    fitted, unseen = selection_roles.for_validation(given, beside)
+    assert [r.path for r in fitted] == ["a", "c"] and [r.path for r in unseen] == ["d", "e", "b"]
+    assert told(selection_roles.for_validation, given, [*beside, replace(given[0], path="f", role="broadband")]) == (
+        "f: it is given for validation and its role is broadband; give it to be fitted, or leave the role out."
+    )
+    assert told(selection_roles.for_validation, given[1:2] * 2, ()) == (
+        "b: every recording has the role validation; leave one without a role, to be fitted."
+    )
+
+
+def test_of_broadband_records_at_one_rate_those_of_the_longest_period_are_averaged():
+    short, long, chirps = (
+        recording(np.tile(multisine(0.3, seed=k)[: 8000 // n], n), period=period, name=name)
+        for k, (n, period, name) in enumerate(((2, 4000, "short"), (1, 8000, "long"), (1, None, "chirp")))
+    )
+    found = roles([recording(SINE), short, chirps, long, replace(long, path="twin")])
+    assert [r.path for r in found.response] == ["long", "twin"]
+    assert [r.path for r in found.broadband] == ["short", "chirp", "long", "twin"]
+
+
+def test_what_a_broadband_record_is_not_fitted_for_is_told_in_full():
+    sine, slow, fast = (
+        recording(SINE),
+        recording(multisine(0.3), 1000.0, name="slow"),
+        recording(chirp(0.3), name="fast"),
+    )
+    served = roles([sine, slow, fast])
+    assert warnings.use_warnings(served, linear=False) == [
+        f"{name}: broadband, and fitted by nothing: no model with a linear part was asked for."
+        for name in ("slow", "fast")
+    ]
+    assert warnings.use_warnings(served, linear=True) == [
+        "slow: broadband, and fitted by nothing: only recordings at the highest sample rate and of one period are "
+        "averaged, periodic ones before chirps."
+    ]
+    narrow = replace(recording(LOOPS["half a decade of multisine"], name="narrow"), role="broadband")
+    assert warnings.use_warnings(roles([sine, narrow]), linear=True) == [
+        "narrow: broadband as its role says, though its drive does not fill a decade of frequencies: poles and zeros "
+        "outside what it fills are not known."
+    ]
+    one = recording(multisine(0.3), period=8000, name="one")
+    assert warnings.use_warnings(roles([sine, one]), linear=True) == [
+        "one: one period only, so it is fitted as a drive that does not repeat; record two periods, or the same lines "
+        "with other phases, to tell noise from distortion."
+    ]
+    assert warnings.use_warnings(roles([one, recording(multisine(5.0), name="large")]), linear=False) == []
+
+
+def test_the_valid_range_is_told_in_full():
+    assert warnings.range_warnings((-2.34567, 7.12345), 345.6789) == [
+        "Valid for drives from -2.346 V to 7.123 V; outside that range the model is an extrapolation.",
+        "Not valid above 345.7 V/s, the fastest rate of the recordings: a sine over the whole drive range reaches it "
+        "at 11.62 Hz.",
+    ]
+
+
+def test_a_drift_is_told_in_full_for_the_record_that_has_it():
+    """3 urad over 150 of 200 samples of 2 kHz; before them the residual is no trend."""
+    residual = np.concatenate([np.full(50, 9.0), np.linspace(5e-6, 2e-6, 150) + 1e-9 * (-1.0) ** np.arange(150)])
+    moving, still = Prediction(np.zeros(200), residual, 50, 100, 0), Prediction(np.zeros(200), np.zeros(200), 0, 100, 0)
+    given = [recording(SINE[:200], name=name) for name in ("a", "b")]
+    largest, found = warnings.drift([still, moving], given, 4e-4)
+    assert largest == pytest.approx(-3e-6, rel=1e-4)
+    assert found == [
+        "b: the residual drifts by -3 ± 0.00028 urad (-0.75 % of the peak-to-peak output) in 0.075 s: creep beyond "
+        "what the model holds, or a warming sensor."
+    ]
+
+
+def test_two_records_of_millivolts_may_both_go_beyond_the_fitted_drives():
+    given = [recording([9000.0, 0.0, 6000.0, -2000.0, 3000.0]), recording([8000.0, 5110.0, 5090.0, -1090.0, -1150.0])]
+    seen = [Prediction(np.zeros(5), np.zeros(5), 0, split, 0) for split in (1, 0)]
+    assert warnings.held_out_warnings(given, Units("mV"), (-1.0, 4.0), seen) == [
+        "6 held-out samples lie outside the fitted drive range; the held-out residual judges them too."
+    ]
+
+
+def test_scores_that_speak_against_a_model_are_told_in_full():
+    assert warnings.score_warnings(Score("m", 1.234, 9.0, 5.678, 9.0), Score("line", 8.0, 9.0, 5.5, 9.0)) == [
+        "No model is better than a straight line on the held-out samples: do not use the hysteresis.",
+        "The residual grows from 1.23 % on the fitted samples to 5.68 % on the held-out ones: drift, another regime, "
+        "or too short a record.",
+    ]
+
+
+def test_residuals_that_are_not_noise_are_told_in_full():
+    auto, cross = (np.where(np.arange(n) < k, 0.5, -0.01) for n, k in ((40, 10), (41, 20)))
+    assert residual_warnings(ResidualTest(400, 0.098, auto, -cross)) == [
+        "The residual on the held-out samples is not white: 25 % of its correlations over 40 samples lie outside ± "
+        "0.098 (5 % would be noise). Standard errors count that; what is left is dynamics, hysteresis or disturbance "
+        "outside the model.",
+        "The residual follows the drive: 49 % of the cross-correlations lie outside ± 0.098 (5 % would be noise), so a "
+        "better model of these recordings exists.",
+    ]
+
+
+@pytest.mark.parametrize(("samples", "order", "lags"), [(39, 1, 38), (100, 5, 50), (400, 20, 50), (1000, 20, 50)])
+def test_a_short_residual_has_fewer_lags_and_a_shorter_whitener(samples, order, lags):
+    test = residual_test(philox(1).standard_normal(samples), philox(2).standard_normal(samples))
+    assert len(test.autocorrelation) == min(lags, samples - 1)
+    assert len(test.cross_correlation) == min(50, samples - order - 1) + 1
+
+
+def test_rates_of_loops_are_told_in_full(monkeypatch):
+    fit = object.__new__(PrandtlIshlinskiiFit)
+    monkeypatch.setattr(warnings, "noisiness", lambda records: 0.2345)
+    monkeypatch.setattr(warnings, "loop_rates", lambda records: (12.3456, 2345.678))
+    monkeypatch.setattr(warnings, "one_rate_only", lambda records: False)
+    noisy = (
+        "The drive is noisy: its rate from sample to sample scatters by 23 % of the fastest rate; use the commanded "
+        "drive, or filter it, before trusting rate-dependent parameters."
+    )
+    assert warnings.rate_warnings((), fit) == [
+        "The loops have peak rates from 12.35 V/s to 2346 V/s, and the model does not depend on rate: one average loop "
+        "stands for all.",
+        noisy,
+    ]
+    monkeypatch.setattr(warnings, "one_rate_only", lambda records: True)
+    assert warnings.rate_warnings((), fit) == [
+        "One loop rate only (peaks from 12.35 V/s to 2346 V/s): how the hysteresis changes with frequency is not known "
+        "from these recordings, and delta and d2 only describe the shape of this loop; record the same loop at two "
+        "more frequencies.",
+        noisy,
+    ]
+
+
+def with_values(kind, **values):
+    fit = object.__new__(kind)
+    for key, value in values.items():
+        object.__setattr__(fit, key, value)
+    return fit
+
+
+def test_a_mirror_that_first_moves_the_wrong_way_is_told_in_full_with_the_slope_of_its_form():
+    """Turned over where it falls: d1 = -40 mrad/V, and behind a reversal 2 epsilon = 100 mrad/V against it."""
+    model = BoucWen(-0.04, 0.0, 0.05, 0.0, 2.0, 0.0)
+    static = with_values(
+        BoucWenFit,
+        model=model,
+        admissible=False,
+        slope_after_reversal_rad_per_v=-0.0123456,
+        lowest_slope_rad_per_v=-0.06,
+    )
+    wrong = (
+        "Not admissible: just after a {}reversal the modelled mirror first moves the wrong way ({} mrad/V against d1 = "
+    )
+    assert warnings.fit_warnings(static) == [
+        wrong.format("") + "d1 = 40 mrad/V); the model bouc_wen_admissible excludes it.",
+        warnings._FLIPPED,
+    ]
+    search = SimpleNamespace(converged=False, evaluations=77)
+    joint = with_values(JointFit, model=model, fit=search)
+    assert warnings.fit_warnings(joint) == [
+        "The search for the parameters stopped after 77 evaluations, before it had settled: the model is what the "
+        "scores say, but its standard errors are those of a point that is no minimum.",
+        wrong.format("slow ") + "d1 = 40 mrad/V); a Prandtl-Ishlinskii model never does.",
+        warnings._FLIPPED,
+    ]
+    plays = with_values(PrandtlIshlinskiiFit, sign=-1)
+    assert warnings.fit_warnings(plays) == [warnings._FLIPPED]
+    assert warnings.fit_warnings(with_values(PrandtlIshlinskiiFit, sign=1)) == []

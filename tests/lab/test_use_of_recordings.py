@@ -246,3 +246,45 @@ def test_an_identification_goes_to_another_process_whole():
         drive = found.recordings[0].drive[:, 0]
         np.testing.assert_array_equal(a.response(drive, 1 / RATE)[0], b.response(drive, 1 / RATE)[0])
     np.testing.assert_array_equal(again.predictions[1][0].model_rad, found.predictions[1][0].model_rad)
+
+
+def test_a_share_that_leaves_too_little_of_the_second_record_is_told_in_full():
+    long, short = of_drive(np.sin(np.arange(1000))), replace(of_drive(np.sin(np.arange(333))), path="short")
+    with pytest.raises(IdentificationError) as caught:
+        split_points([long, short], 0.25, validated=True)
+    assert str(caught.value) == (
+        "short: 250 samples to fit and 83 to check; each part needs at least 100; record longer or choose hold_out "
+        "nearer to 0.5."
+    )
+    with pytest.raises(IdentificationError) as caught:
+        split_points([long], 1.25, validated=True)
+    assert str(caught.value) == (
+        "--hold-out (hold_out) is 1.25; give the share of each recording kept for the check, between 0 and 1, e.g. "
+        "0.5, or 0 with recordings for validation."
+    )
+    assert split_points([long, replace(short, path="other")], 0.4, validated=False) == [600, 200]
+
+
+def test_of_two_records_only_the_one_split_too_early_is_told_with_its_own_drives():
+    wave = 5.0 + 4.0 * np.sin(2 * np.pi * np.arange(1000) / 100)
+    rising = np.concatenate([wave[:600] / 2, -3.0 * wave[600:]])
+    assert split_warnings([of_drive(wave), replace(of_drive(rising), path="rising")], [500, 600], 0.001) == [
+        "rising: the fitted part sweeps 0.0005 V to 0.0045 V of the -0.027 V to 0.0045 V that were recorded; hold less "
+        "out, record more periods, or give another recording for validation."
+    ]
+
+
+def test_the_worst_recording_is_the_one_of_the_largest_rms_from_where_it_counts():
+    """The second one is farthest off before its first 10 samples, the third one has the largest peak."""
+    given = [replace(of_drive(np.arange(100.0)), path=f"in/{name}.csv", rate_hz=rate) for name, rate in OF_RATES]
+    left = np.zeros((4, 100))
+    left[0, 20:], left[1, :10], left[2, 50], left[3] = 2e-6, 1.0, 9e-6, 1e-6
+    seen = [Prediction(np.zeros(100), each, 10, split, 0) for each, split in zip(left, (60, 100, 80, 0), strict=True)]
+    found = evidence(given, seen)
+    assert found.judged == (("a.csv", pytest.approx(0.4)), ("c.csv", pytest.approx(0.4)), ("d.csv", pytest.approx(0.5)))
+    assert found.text == "1.3 s of 3 recordings, a.csv (0.4 s) and c.csv (0.4 s) and d.csv (0.5 s)"
+    assert (found.worst, found.worst_peak_rad) == ("a.csv", pytest.approx(2e-6))
+    assert found.worst_rms_rad == pytest.approx(2e-6 * np.sqrt(80 / 90))
+
+
+OF_RATES = ("a", 100.0), ("b", 10.0), ("c", 50.0), ("d", 200.0)
