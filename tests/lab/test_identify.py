@@ -26,15 +26,19 @@ from microrad.lab.identify import (
     identify,
     mirror_file_text,
     predict,
+    statistics,
 )
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, _bound_gradient, _not_identified
 from microrad.lab.identify.hysteresis.plant_fit import _not_identified as _not_identified_jointly
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.mirror_file import _names
 from microrad.lab.identify.records import fastest_rate, lead, memory, si_records, transient, turning_points
-from microrad.lab.identify.selection import candidates
+from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.choice import choose_best
+from microrad.lab.identify.selection.warnings import _FLIPPED
 from microrad.lab.identify.statistics import colour_inflation, may_be_chance
 from microrad.lab.recording import read_recording, recording_from_arrays
+from microrad.mirror.hysteresis import BoucWen
 from microrad.mission.file import load_mirror
 from places import DATA, ROOT
 
@@ -894,3 +898,226 @@ def test_the_gradient_of_the_bound_is_that_of_differences(epsilon):
 def test_more_than_three_recordings_are_counted_behind_the_first():
     assert _names(["x/a.csv", "b.csv", "c.csv"]) == "a.csv, b.csv, c.csv"
     assert _names(["x/a.csv", "b.csv", "c.csv", "d.csv"]) == "a.csv and 3 more"
+
+
+# ------------------------------------------------------------------------------------------ estimates, by hand
+def test_the_colour_of_a_residual_is_that_of_its_mean_free_part_and_the_largest_of_all():
+    """The first pair of lags is 69 over 60, and the second one is below 0."""
+    values = np.array([4.0, 1.0, -2.0, -3.0, 2.0, 3.0, -1.0, -4.0, 0.0])
+    lags = [sum(values[k:] * values[: 9 - k]) / sum(values**2) for k in range(4)]
+    pairs = [lags[0] + lags[1], lags[2] + lags[3]]
+    expected = max(1.0, 2 * sum(p for k, p in enumerate(pairs) if min(pairs[: k + 1]) >= 0) - 1)
+    for offset in (0.0, 100.0):
+        assert colour_inflation([values + offset]) == pytest.approx(expected, rel=1e-9)
+    slow = np.repeat([1.0, -1.0, 1.0, -1.0], 8)
+    white = np.tile([1.0, -1.0, -1.0, 1.0, -1.0], 5)
+    assert colour_inflation([white, slow, white]) == colour_inflation([slow]) > 2.0
+
+
+def test_losses_of_two_records_of_unlike_length_count_by_their_samples():
+    """A mean of 1 and a variance of 9 over 144 samples: two standard errors are 0.5; of 24 they are 1.22."""
+    wave = np.where(np.arange(120) % 2, 3.0, -3.0)
+    for samples, mean, chance in ((144, 0.49, True), (144, 0.51, False), (24, 1.2, True), (24, 1.25, False)):
+        parts = [mean + wave[: samples // 3], mean + wave[: samples - samples // 3]]
+        best = [philox(k).standard_normal(part.size) for k, part in enumerate(parts)]
+        assert statistics.may_be_chance([a + b for a, b in zip(parts, best, strict=True)], best) is chance
+
+
+def test_derivatives_have_a_step_of_their_own_and_errors_add_up():
+    at, steps = np.array([2.0, 3.0, 5.0]), np.array([1e-3, 2e-3, 4e-3])
+
+    def products(v):
+        return np.array([[v[0] * v[1], v[1] * v[2]], [v[0] ** 2, 7.0 * v[2]]])
+
+    found = statistics.central_differences(products, at, steps)
+    expected = [[[3.0, 2.0, 0.0], [0.0, 5.0, 3.0]], [[4.0, 0.0, 0.0], [0.0, 0.0, 7.0]]]
+    assert found.shape == (2, 2, 3)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    covariance = np.array([[0.04, 0.01, 0.0], [0.01, 0.09, -0.02], [0.0, -0.02, 0.01]])
+    errors = statistics.propagated(lambda v: products(v).ravel(), at, covariance)
+    slopes = np.reshape(expected, (4, 3))
+    np.testing.assert_allclose(errors, np.sqrt(np.diag(slopes @ covariance @ slopes.T)), rtol=1e-6)
+
+
+def test_what_is_computed_from_a_number_without_error_has_none_and_one_of_nothing_has_a_step():
+    covariance = np.diag([0.0, 0.25, 0.0])
+    errors = statistics.propagated(
+        lambda v: np.array([3.0 * v[0], 2.0 * v[1] + v[2]]), np.array([5.0, 0.0, 0.0]), covariance
+    )
+    np.testing.assert_allclose(errors, [0.0, 1.0], rtol=1e-6)
+
+
+def test_a_correlation_is_signed_and_that_of_its_own_pair():
+    own = statistics.correlation(np.array([[4.0, -3.0, 0.5], [-3.0, 9.0, 0.75], [0.5, 0.75, 0.25]]))
+    np.testing.assert_allclose(own, [[1.0, -0.5, 0.5], [-0.5, 1.0, 0.5], [0.5, 0.5, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (123.456789, 0.0, "123.46"),
+        (123.456789, math.nan, "123.46"),
+        (123.456789, math.inf, "123.46"),
+        (123.456789, 3.21, "123.5"),
+        (123.456789, 0.0321, "123.46"),
+        (0.00123456789, 0.0000996, "0.00123"),
+        (0.00123456789, 0.000099, "0.001235"),
+        (0.00123456789, 0.00000995, "0.0012346"),
+        (-0.004, 0.9, "0"),
+        (87654.321, 4321.0, "87700"),
+        (-1234.5678, 0.96, "-1234.6"),
+        (-1234.5678, 99.6, "-1230"),
+    ],
+)
+def test_a_value_is_printed_with_two_digits_of_its_error_and_five_at_most(value, error, text):
+    assert statistics.rounded_to_error(value, error) == text
+
+
+def test_per_cent_of_a_span_are_of_the_rms_and_of_the_largest_size():
+    assert statistics.percent(np.array([[3.0, -7.0], [1.0, 5.0]]), 40.0) == pytest.approx(
+        (100 * np.sqrt(21) / 40, 17.5)
+    )
+
+
+# ------------------------------------------------------------------------------------------ a mirror file, line by line
+def static_identification(fit, **changes):
+    """What the texts of a mirror file need of an identification of two loops, one for validation and one broadband."""
+    uses = [
+        choice.RecordingUse("in/a.csv", "aa", 600, 400),
+        choice.RecordingUse("in/b.csv", "bb", 700, 300),
+        choice.RecordingUse("in/w.csv", "ww", 500, 0, "broadband"),
+        choice.RecordingUse("in/v.csv", "vv", 0, 900, "validation"),
+    ]
+    given = {
+        "fits": (fit,),
+        "scores": (predictions.Score(fit.name, 0.12345, 1.2345, 0.54321, 5.4321),),
+        "straight_line": predictions.Score("straight line", 2.3456, 6.7, 3.4567, 8.9),
+        "chosen": fit.name,
+        "reason": "it is\nthe best.",
+        "warnings": ("one.", "two."),
+        "sources": tuple(uses),
+        "linear": None,
+        "travel_rad": 1.23456789e-3,
+        "drive_min_v": -1.5,
+        "drive_max_v": 8.25,
+    }
+    own = object.__new__(choice.Identification)
+    vars(own).update(given | changes)
+    return own
+
+
+def test_a_mirror_file_of_plays_is_line_by_line_what_was_found():
+    fit = PrandtlIshlinskiiFit(
+        thresholds_v=np.array([0.0, 0.5, 1.5, 3.0]),
+        weights_rad_per_v=np.array([0.0, 2e-4, 0.0, 5e-5]),
+        standard_errors_rad_per_v=np.array([np.nan, 1.234e-6, np.nan, 4.567e-7]),
+        sign=-1,
+        offsets_rad=(0.0, 0.0),
+        rate_limit_v_per_s=432.1,
+        units=Units(),
+        colour_inflation=1.0,
+        condition_number=1.0,
+        residual_rms_percent=0.1,
+        samples_used=1300,
+    )
+    given = [play_record((1e-3,), (0.0,), seed=k) for k in (1, 2)]
+    seen = tuple(predictions.Prediction(np.zeros(4000), np.zeros(4000), 0, split, 0) for split in (2400, 2800))
+    lines = mirror_file_text(static_identification(fit, recordings=given, predictions=(seen,)), "of two").split("\n")
+    assert lines[: lines.index("[uncertainty]")] == [
+        "# Mirror identified from 4 recording(s), model prandtl_ishlinskii.",
+        "#   in/a.csv (loops): 600 samples fitted, 400 held out",
+        "#   sha256 aa",
+        "#   in/b.csv (loops): 700 samples fitted, 300 held out",
+        "#   sha256 bb",
+        "#   in/w.csv (broadband): 500 samples fitted, 0 held out",
+        "#   sha256 ww",
+        "#   in/v.csv (validation): 0 samples fitted, 900 held out",
+        "#   sha256 vv",
+        "# 1300 samples used, behind the initial transient of each recording.",
+        "# Residual in % of the peak-to-peak output, rms (peak):",
+        "#   prandtl_ishlinskii: 0.123 (1.23) on the fitted samples, 0.543 (5.43) on the held-out samples",
+        "#   straight line: 2.346 (6.70) on the fitted samples, 3.457 (8.90) on the held-out samples",
+        "# Choice: it is the best.",
+        "# Warning: one.",
+        "# Warning: two.",
+        f"# Warning: {_FLIPPED}",
+        'name = "of two"',
+        'travel = "1.235 mrad"                        # identified: fitted range, from a.csv, b.csv',
+        'composition = "static"                       # identified: the linear dynamics of the mirror were not '
+        "identified",
+        'rate_limit = "432.1 V/s"                     # identified: fastest rate of the drive, from a.csv, b.csv',
+        'bias = "3.375 V"                             # identified: middle of the drive range, from a.csv, b.csv',
+        'drive_min = "-1.5 V"                         # identified: lowest drive, from a.csv, b.csv',
+        'drive_max = "8.25 V"                         # identified: highest drive, from a.csv, b.csv',
+        "",
+        "[prandtl_ishlinskii]",
+        'thresholds = ["0.0 V", "0.5 V", "3.0 V"] # identified: chosen, not fitted; from a.csv, b.csv',
+        'weights = ["0.0 mrad/V", "0.2 mrad/V", "0.05 mrad/V"] # identified: ± standard error at 0, 0.0012, 0.00046 '
+        "mrad/V, from a.csv, b.csv",
+        "",
+    ]
+    assert lines[lines.index("[uncertainty]") + 1 : -3] == [
+        'parameters = ["prandtl_ishlinskii.weights.2", "prandtl_ishlinskii.weights.3"] # identified: those not held or '
+        "at a bound",
+        "standard_errors = [0.00617, 0.00913] # identified: relative to the values, at most 1 in any combination, from "
+        "a.csv, b.csv",
+        "correlation = [",
+    ]
+    assert lines[-2:] == [
+        "] # identified: of the values, lower triangle row by row; a sum may be known far better than its parts",
+        "",
+    ]
+
+
+def test_a_mirror_file_of_eq_3_that_falls_has_its_signs_and_their_errors_turned():
+    """d1, epsilon and beta are counted the other way, and so is what they have to do with the others."""
+    sizes = np.array([4e-6, 2e-7, 3e-6, 5e-5, 2.0, 1.5])
+    between = np.eye(6)
+    between[0, 1] = between[1, 0] = 0.5
+    between[0, 2] = between[2, 0] = -0.25
+    between[4, 5] = between[5, 4] = 0.75
+    fit = BoucWenFit(
+        model=BoucWen(-8e-5, 3e-7, 4e-5, 5e-4, 40.0, 30.0, 777.0),
+        offsets_rad=(0.0,),
+        units=Units(),
+        covariance=sizes[:, None] * between * sizes,
+        colour_inflation=1.0,
+        condition_number=1.0,
+        not_identified=(("delta", "of a reason"), ("d2", "of another")),
+        residual_rms_percent=0.1,
+        start_rms_percent=(0.1,),
+        agreeing_starts=1,
+        slope_after_reversal_rad_per_v=1e-6,
+        lowest_slope_rad_per_v=1e-6,
+        admissible=True,
+        constrained=False,
+        samples_used=987,
+    )
+    text = mirror_file_text(static_identification(fit), 'the "one"')
+    lines = text.split("\n")
+    assert lines[14:19] == [
+        "# Warning: one.",
+        "# Warning: two.",
+        f"# Warning: {_FLIPPED}",
+        "# Not identified: delta, of a reason",
+        "# Not identified: d2, of another",
+    ]
+    assert lines[19] == 'name = "the \\"one\\""'
+    at = lines.index("[bouc_wen]")
+    named = (
+        ("d1", "0.08 mrad/V", "0.004 mrad/V"),
+        ("d2", "3e-07 s/V", "2e-07 s/V"),
+        ("epsilon", "-0.04 mrad/V", "0.003 mrad/V"),
+    )
+    named += ("delta", "0.0005 s/V", "5e-05 s/V"), ("alpha", "40.0 1/V", "2 1/V"), ("beta", "-30.0 1/V", "1.5 1/V")
+    assert [re.split(" +# ", line) for line in lines[at + 1 : at + 7]] == [
+        [f'{key} = "{value}"', f"identified: ± standard error {error}, from a.csv, b.csv"]
+        for key, value, error in named
+    ]
+    read = tomllib.loads(text)
+    assert read["uncertainty"]["parameters"] == [f"bouc_wen.{key}" for key in PARAMETERS]
+    assert read["uncertainty"]["standard_errors"] == pytest.approx([0.05, 2 / 3, 0.075, 0.1, 0.05, 0.05], rel=1e-2)
+    rows = [[float(v) for v in line.strip(" ,").split(",")] for line in lines[-7:-2]]
+    np.testing.assert_allclose(rows[0], [-0.5], atol=1e-3)
+    np.testing.assert_allclose(rows[1], [-0.25, 0.0], atol=1e-3)
+    np.testing.assert_allclose(rows[4], [0.0, 0.0, 0.0, 0.0, -0.75], atol=1e-3)

@@ -522,9 +522,7 @@ def test_a_mirror_that_first_moves_the_wrong_way_is_told_in_full_with_the_slope_
         slope_after_reversal_rad_per_v=-0.0123456,
         lowest_slope_rad_per_v=-0.06,
     )
-    wrong = (
-        "Not admissible: just after a {}reversal the modelled mirror first moves the wrong way ({} mrad/V against d1 = "
-    )
+    wrong = "Not admissible: just after a {}reversal the modelled mirror first moves the wrong way (-60 mrad/V against "
     assert warnings.fit_warnings(static) == [
         wrong.format("") + "d1 = 40 mrad/V); the model bouc_wen_admissible excludes it.",
         warnings._FLIPPED,
