@@ -1,5 +1,6 @@
 """The joint fit on the Bouc-Wen benchmark, against an oracle that knows nothing of the kernels, and its uncertainty."""
 
+import pickle
 from dataclasses import astuple, replace
 from math import pi
 
@@ -8,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.lab.identify import IdentificationError
-from microrad.lab.identify.hysteresis import structures
+from microrad.lab.identify.hysteresis import plant_fit, structures
+from microrad.lab.identify.hysteresis.bouc_wen import made_rising
 from microrad.lab.identify.hysteresis.plant_fit import (
     FitRecord,
     Parameter,
@@ -21,13 +23,13 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     simulate_record,
     upsampled,
 )
-from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator, one_axis
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, hysteretic_oscillator, one_axis
 from microrad.lab.recording import Recording, read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
 from places import DATA
-from truths import plays, recorded, two_sines
+from truths import philox, plays, recorded, two_sines
 
 BENCHMARK = DATA / "boucwen" / "train.h5"
 needs_benchmark = pytest.mark.skipif(not BENCHMARK.exists(), reason=f"recording boucwen absent: {BENCHMARK}")
@@ -470,3 +472,197 @@ def test_what_depends_on_the_rate_is_searched_as_far_as_the_fastest_drive_shows_
     d2, delta = parameters[-2:]
     assert (d2.lower, d2.upper) == pytest.approx((-most, most))
     assert (delta.lower, delta.upper) == pytest.approx((-3.0 * most, 10.0 * most))
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def test_the_oscillator_is_built_of_its_numbers_each_in_its_place():
+    structure = hysteretic_oscillator(2.0, 10.0, 300.0, 70.0, 8.0, -11.0)
+    assert [(p.name, p.unit, p.start, p.lower, p.upper) for p in structure.parameters] == [
+        ("mass", "kg", 2.0, 0.1, np.inf),
+        ("damping", "N s/m", 10.0, 0.0, np.inf),
+        ("stiffness", "N/m", 300.0, 0.0, np.inf),
+        ("slope", "N/m", 70.0, -np.inf, np.inf),
+        ("decay", "1/m", 8.0, 0.0, np.inf),
+        ("asymmetry", "1/m", -11.0, -np.inf, np.inf),
+    ]
+    plant = structure.build(np.array([4.0, 6.0, 100.0, 71.0, 9.0, -12.0]))
+    assert (plant.name, structure.name) == ("hysteretic oscillator", "hysteretic oscillator")
+    assert (plant.A.tolist(), plant.B.tolist()) == ([[0.0, 1.0], [-25.0, -1.5]], [[0.0], [0.25]])
+    assert (plant.E.tolist(), plant.F.tolist(), plant.C.tolist()) == ([[0.0], [-0.25]], [[1.0, 0.0]], [[1.0, 0.0]])
+    assert [m.tolist() for m in (plant.G, plant.D, plant.K)] == [[[0.0]]] * 3
+    assert plant.bouc_wen == (BoucWen(0.0, 0.0, 71.0, 0.0, 9.0, -12.0),) and (plant.plays, plant.inverse) == ((), ())
+
+
+LINEAR = LinearPoles(Roots((80.0, 30.0), (0.2, 1.0)), Roots((60.0, 45.0), (-0.4, -1.0)), 3.0, 2e-3, 1e-4)
+
+
+def test_every_pole_zero_and_the_delay_is_searched_by_its_own_number():
+    parameters, make = structures._linear_part(LINEAR, True)
+    found = [(p.name, p.unit, p.start, p.lower, p.upper, p.scale) for p in parameters]
+    fastest = 1 / (2 * pi * 80.0)
+    assert found == [
+        ("pole 1", "Hz", 80.0, 4.0, 1600.0, 80.0),
+        ("pole 1 damping", "", 0.2, 1e-4, 0.9999, pytest.approx(0.02)),
+        ("pole 2", "Hz", 30.0, 1.5, 600.0, 30.0),
+        ("zero 1", "Hz", 60.0, 3.0, 1200.0, 60.0),
+        ("zero 1 damping", "", -0.4, -0.9999, 0.9999, pytest.approx(0.04)),
+        ("zero 2", "Hz", 45.0, 2.25, 900.0, 45.0),
+        ("delay", "s", 2e-3, pytest.approx(1.6e-3), pytest.approx(2.4e-3), pytest.approx(fastest)),
+    ]
+    made = make(np.array([81.0, 0.21, 31.0, 61.0, -0.41, 46.0, 2.1e-3]))
+    assert made == replace(
+        LINEAR, poles=Roots((81.0, 31.0), (0.21, 1.0)), zeros=Roots((61.0, 46.0), (-0.41, -1.0)), delay_s=2.1e-3
+    )
+    assert structures._linear_part(LINEAR, False)[1](None) is LINEAR
+    assert structures._linear_part(None, True)[0] == () and structures._linear_part(None, True)[1](None) is None
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "error_s", "reach"),
+    [
+        (0.0, np.inf, 10 / (2 * pi * 80.0)),
+        (-5e-3, np.inf, 0.05),
+        (1e-3, 1e-2, 10 / (2 * pi * 80.0)),
+        (1e-3, 1e-5, 4e-5),
+    ],
+)
+def test_a_delay_is_searched_ten_times_its_size_or_four_of_its_errors_far(delay_s, error_s, reach):
+    found = structures._linear_part(replace(LINEAR, delay_s=delay_s, delay_error_s=error_s), True)[0][-1]
+    assert (found.lower, found.upper) == pytest.approx((delay_s - reach, delay_s + reach))
+
+
+def test_roots_are_told_by_frequency_and_damping_from_slow_to_fast():
+    roots = Roots.of(2 * pi * np.array([-3 + 4j, -3 - 4j, -2.0, 7.0, 1 + 10j, 1 - 10j, 6j, -6j]))
+    assert roots.frequencies_hz == pytest.approx((2.0, 5.0, 6.0, 7.0, np.sqrt(101)))
+    assert roots.dampings == pytest.approx((1.0, 0.6, 0.0, -1.0, -1 / np.sqrt(101)))
+    assert roots.without(1, 3) == Roots(
+        (roots.frequencies_hz[0], *roots.frequencies_hz[2::2]), (1.0, *roots.dampings[2::2])
+    )
+    assert_allclose(np.sort_complex(Roots((5.0, 2.0), (0.6, 1.0)).values), 2 * pi * np.array([-3 - 4j, -3 + 4j, -2.0]))
+
+
+def test_an_axis_is_made_of_the_parts_of_its_values_and_lags_stand_beside_it():
+    plays_of = PrandtlIshlinskii((0.0, 1.5, 4.0), (-5e-5, -2e-5, -1e-5), 2e-3, 250.0)
+    lags = Creep((-1e-6, 3e-9), (0.1, 2.5))
+    proper = replace(LINEAR, zeros=Roots((60.0,), (-0.4,)))
+    axis = one_axis("own", plays_of, linear=proper, creep=lags, free=("widening",), free_linear=True)
+    assert [p.name for p in axis.parameters[3:7]] == ["widening", "creep at 0.1 s", "creep at 2.5 s", "pole 1"]
+    assert [(p.unit, p.start, p.linear) for p in axis.parameters[4:6]] == [
+        ("rad/V", -1e-6, True),
+        ("rad/V", 3e-9, True),
+    ]
+    assert [p.scale for p in axis.parameters[4:6]] == pytest.approx([1e-6, 8e-8])
+    values = np.array([-6e-5, 0.0, -3e-5, 4e-3, -2e-6, 0.0, 81.0, 0.21, 31.0, 61.0, -0.41, 7e-4])
+    made = axis.parts(values)
+    assert made.model == PrandtlIshlinskii((0.0, 1.5, 4.0), (-6e-5, 0.0, -3e-5), 4e-3, 250.0)
+    assert made.creep == Creep((-2e-6, 0.0), (0.1, 2.5))
+    assert (made.linear.poles.frequencies_hz, made.linear.delay_s, axis.late(values)) == ((81.0, 31.0), 7e-4, 7e-4)
+    built = axis.build(values)
+    assert built.plays == (PrandtlIshlinskii((0.0, 4.0), (-6e-5, -3e-5), 4e-3, 250.0),)
+    assert [number for number, _ in axis.beside] == [4, 5]
+    assert_allclose([lag.A[0, 0] for _, lag in axis.beside], [-10.0, -0.4])
+    again = pickle.loads(pickle.dumps(axis))
+    assert [p.name for p in again.parameters] == [p.name for p in axis.parameters] and again.name == "own"
+    assert again.parts(values) == made
+    static = one_axis("static", plays_of)
+    assert static.late(np.zeros(3)) == 0.0 and static.build(np.array([-1e-5, 0.0, 0.0])).A.size == 0
+    assert len(static.parameters) == 3 and static.parts(np.array([-1e-5, -2e-5, 0.0])).model.widening_s == 2e-3
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_admissible_model_takes_the_share_of_its_limit_that_is_searched(sign):
+    """d1 = 30, and behind a reversal epsilon counts 2 alpha / k_settled times."""
+    model = BoucWen(sign * 3e-5, 0.0, sign * -1e-5, 0.0, 0.5, 0.2)
+    parameters, make = structures._bouc_wen_part(model, (), True)
+    share = parameters[1]
+    assert (share.name, share.lower, share.upper, share.scale) == ("epsilon over its limit", -10.0, 1.0, 0.1)
+    assert share.start == pytest.approx(min(1e-5 * model.reversal_swing / 3e-5, 0.95))
+    assert [p.linear for p in parameters] == [False] * 4
+    edge = make(np.array([sign * 4e-5, 1.0, 0.5, 0.4]))
+    assert made_rising(edge).reversal_slope_rad_v() == pytest.approx(0.0, abs=1e-18)
+    inside = make(np.array([sign * 4e-5, 0.25, 0.5, 0.4]))
+    assert made_rising(inside).reversal_slope_rad_v() == pytest.approx(3e-5)
+    assert structures._bouc_wen_part(replace(model, epsilon_rad_v=sign * -9e-5), (), True)[0][1].start == 0.95
+
+
+def test_parameters_of_a_bouc_wen_model_have_their_bounds_and_sizes():
+    parameters, _ = structures._bouc_wen_part(MODEL, RATES + SHAPES, False)
+    assert [(p.name, p.unit, p.start, p.lower, p.upper, p.scale, p.linear) for p in parameters] == [
+        ("d1", "rad/V", 3e-5, -np.inf, np.inf, 3e-5, True),
+        ("epsilon", "rad/V", -2e-5, -np.inf, np.inf, 2e-5, False),
+        ("alpha", "1/V", 0.5, 5e-4, np.inf, 0.5, False),
+        ("beta over alpha", "", 0.4, -0.999, 0.999, 0.1, False),
+        ("d2", "s/V", 1e-6, -1 / 400, 1 / 400, pytest.approx(0.01 / 400), False),
+        ("delta", "s/V", -2e-6, pytest.approx(-3 / 400), pytest.approx(10 / 400), pytest.approx(0.1 / 400), False),
+        ("gamma over alpha", "", 0.2, -0.999, 0.999, 0.1, False),
+        ("eta over alpha", "", -0.1, -0.999, 0.999, 0.1, False),
+        ("exponent", "", 2.0, 1.0, 10.0, 10.0, False),
+    ]
+
+
+def test_why_numbers_are_not_identified_is_told_of_each_with_its_unit():
+    given = [
+        Parameter("low", "V", 1.0, lower=0.5),
+        Parameter("high", "", 1.0, upper=2.0),
+        Parameter("zero", "rad/V", 1.0),
+        Parameter("vague", "s", 1.0),
+        Parameter("one", "s", 1.0),
+        Parameter("other", "s", 1.0),
+        Parameter("known", "s", 1.0),
+    ]
+    size = np.array([0.1, 0.1, 3.456, 1.5, 0.2, 0.3, 0.1])
+    between = np.eye(7)
+    between[4, 5] = between[5, 4] = -0.9876
+    between[6, 0] = between[0, 6] = 0.94
+    found = plant_fit._not_identified(
+        Structure("s", tuple(given), None),
+        np.array([0.5, 2.0, -3.0, -2.0, 5.0, 7.0, 9.0]),
+        size[:, None] * between * size,
+    )
+    assert found == [
+        ("low", "at its bound, 0.5 V"),
+        ("high", "at its bound, 2"),
+        ("zero", "not told from 0: standard error 3.5 rad/V"),
+        ("vague", "relative standard error 75 %"),
+        ("one", "correlation 0.988 with other"),
+        ("other", "correlation 0.988 with one"),
+    ]
+
+
+@pytest.mark.parametrize("samples", [64, 65])
+def test_the_scatter_of_white_noise_is_its_variance_times_the_columns_of_both_outputs(samples):
+    """With no power but at one line the mean counts; of an even number of samples the last line counts once."""
+    turn = np.arange(samples)[:, None, None]
+    columns = np.concatenate([np.ones((samples, 2, 1)), np.where(turn % 2, 1.0, -1.0) * [[[2.0], [3.0]]]], axis=2)
+    residual = philox(4).standard_normal((samples, 2, 1))
+    rows = np.concatenate([residual, columns], axis=2).reshape(2 * samples, 3)
+    found = plant_fit.coloured_scatter(rows, 2, np.zeros((samples, 0)), np.zeros((2, 2)))
+    expected = np.zeros((2, 2))
+    for k in range(2):
+        lines = np.fft.rfft(residual[:, k, 0])
+        power = np.abs(lines) ** 2
+        own = np.fft.rfft(columns[:, k], axis=0)
+        size = np.linalg.norm(columns[:, k], axis=0)
+        worth = np.sum(np.abs(own / size) ** 2, axis=1)
+        worth = worth + plant_fit._AS_GOOD_AS_NONE * worth.mean()
+        twice = np.full(len(lines), 2.0)
+        twice[0] = 1.0
+        if samples == 64:
+            twice[-1] = 1.0
+        for n in range(len(lines)):
+            half = max(plant_fit._LINES, n // 10)
+            near = slice(max(n - half, 0), n + half + 1)
+            mean = max(np.mean(power[near]), np.sum(worth[near] * power[near]) / np.sum(worth[near]))
+            expected += twice[n] * mean * np.outer(own[n].conj(), own[n]).real / samples**2
+    assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_a_run_of_several_steps_a_sample_is_late_by_both_delays_and_every_fourth_is_an_output():
+    """Of a gain of 2: the drive, two steps and three later."""
+    drive = np.sin(np.arange(400) / 40.0)[:, None] * np.linspace(0, 1, 400)[:, None] ** 2
+    plant = mirror.discretise(mirror.assemble("gain", "static", None, PrandtlIshlinskii((0.0,), (2.0,))), 0.01)
+    run = FitRecord("r", drive, np.zeros((100, 1)), 0.01, 4, 0, np.zeros((100, 0)), late_s=0.02)
+    assert_allclose(simulate_record(plant, replace(run, late_s=0.0)), 2.0 * drive[::4], atol=1e-12)
+    later = simulate_record(plant, run, delay_s=0.03)
+    assert later.shape == (100, 1)
+    assert_allclose(later[2:, 0], 2.0 * drive[3:395:4][: len(later) - 2, 0], atol=1e-9)
