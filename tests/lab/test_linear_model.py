@@ -37,10 +37,11 @@ from microrad.lab.identify.linear.uncertainty import (
     parameter_covariance,
     transfer_matrix,
     transmission_zeros,
+    uncertainty,
 )
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.records import IdentificationError
-from microrad.lab.identify.statistics import rounded_to_error
+from microrad.lab.identify.statistics import central_differences, rounded_to_error
 from microrad.lab.recording import Recording, multisine_recordings
 from places import DATA
 
@@ -614,3 +615,183 @@ def test_a_falling_gain_is_warned_of_where_it_differs_at_the_lowest_frequency(dc
         roots, np.empty(0), roots, np.empty(0), *(np.array([[each]]) for each in (dc, 0.01, edge, 0.01)), 0.0
     )
     assert bool(range_warnings(known, (1.0, 1000.0))) is warned
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def fit_of(rms, poles, gains, errors, *, band=(1.0, 1000.0), inputs=2):
+    """What of a linear fit the comparison of amplitudes looks at; one mode of unit vectors for each pole."""
+    poles = np.array(poles, dtype=complex)
+    modes = ModalModel(
+        poles,
+        np.ones((poles.size, inputs)) + 0j,
+        np.array([[2.0 + k for k in range(poles.size)]]) + 0j,
+        np.zeros((1, inputs)),
+    )
+    freq = np.array([2.0, 9.0, 11.0, 500.0])
+    response = np.array(gains)[:, None, None] * np.array([[3.0, 4.0]]) + 0j
+    of = SimpleNamespace(drive_rms=np.array(rms), freq_hz=freq, response=response)
+    return SimpleNamespace(modes=modes, excited_hz=band, response=of, poles_error_rad_s=np.array(errors))
+
+
+def test_gain_and_main_resonance_are_compared_from_the_smallest_amplitude_on():
+    """The main resonance has the highest peak of the smallest amplitude, 100 Hz, and is the nearest pole elsewhere."""
+    turn = 2 * np.pi
+    large = fit_of([3.0, 5.0], [-9.0, turn * (-4 + 95j), turn * (-1 + 300j)], [6.0, 8.0, 99.0, 99.0], [0.1, 2.0, 3.0])
+    small = fit_of([1.0, 0.5], [turn * (-2 + 100j), turn * (-9 + 280j)], [5.0, 3.0, 99.0, 99.0], [5.0, 7.0])
+    middle = fit_of([1.0, 2.0], [-5.0, turn * (-30 + 20j), turn * (-3 + 98j)], [7.0, 9.0, 99.0, 99.0], [0.1, 0.2, 11.0])
+    found = amplitude_dependence([large, small, middle])
+    np.testing.assert_allclose(found.drive_rms, [0.75, 1.5, 4.0])
+    np.testing.assert_allclose(found.gain, 5.0 * np.array([4.0, 8.0, 7.0]))  # singular values, to 10 Hz
+    np.testing.assert_allclose(found.resonance_hz, [100.0, 98.0, 95.0])
+    np.testing.assert_allclose(found.resonance_error_hz, np.array([5.0, 11.0, 2.0]) / turn)
+    np.testing.assert_allclose(found.damping_ratio, [2 / np.hypot(2, 100), 3 / np.hypot(3, 98), 4 / np.hypot(4, 95)])
+    assert found.gain_rise_percent == pytest.approx(75.0) and found.resonance_shift_hz == pytest.approx(-5.0)
+    with pytest.raises(
+        IdentificationError, match=r"^1 amplitude given; at least two are needed to see a dependence\.$"
+    ):
+        amplitude_dependence([small])
+
+
+def test_a_peak_is_as_high_as_its_vectors_over_its_decay_and_lies_in_the_band():
+    turn = 2 * np.pi
+    poles = [turn * (-1 + 50j), turn * (-2 + 100j), turn * (-2.9 + 200j)]  # 2 / 1, 3 / 2 and 4 / 2.9
+    for band, main in (((1.0, 1000.0), 50.0), ((60.0, 1000.0), 100.0), ((100.0, 1000.0), 200.0)):
+        one = fit_of([1.0], poles, [1.0] * 4, [0.0] * 3, band=band)
+        other = fit_of([2.0], poles, [1.0] * 4, [0.0] * 3, band=band)
+        assert amplitude_dependence([one, other]).resonance_hz == pytest.approx([main, main])
+    without = fit_of([1.0], poles, [1.0] * 4, [0.0] * 3, band=(50.0, 100.0))
+    with pytest.raises(IdentificationError) as caught:
+        amplitude_dependence([without, without])
+    assert str(caught.value) == "the model has no resonance in the excited band, so there is none to follow."
+
+
+@pytest.mark.parametrize(
+    ("pole", "error", "expected"),
+    [
+        (-30 + 40j, 3 + 4j, (50.0, np.hypot(90, 160) / 50, 0.6, 40 * np.hypot(120, 120) / 50**3)),
+        (-50.0 + 0j, 7 + 9j, (50.0, 7.0, 1.0, 0.0)),
+        (20 + 0j, -3 + 0j, (20.0, 3.0, -1.0, 0.0)),
+        (5 - 12j, 0.5 + 0.25j, (13.0, np.hypot(2.5, 3.0) / 13, -5 / 13, 12 * np.hypot(6.0, 1.25) / 13**3)),
+    ],
+)
+def test_a_pole_as_frequency_and_damping_has_errors_of_both_its_parts(pole, error, expected):
+    found = natural(pole, error)
+    f, f_error, damping, damping_error = expected
+    np.testing.assert_allclose(found, (f / (2 * np.pi), f_error / (2 * np.pi), damping, damping_error), rtol=1e-12)
+
+
+def test_the_covariance_of_numbers_leaves_out_as_many_directions_as_change_nothing():
+    """Scales of 1e-3 to 1e3, one direction that changes nothing, and 90 of 100 rows to spare."""
+    draw, scale = philox(3).standard_normal((100, 4)), np.array([1e-3, 1.0, 1e3, 50.0])
+    draw[:, 3] = draw[:, 0] - 2 * draw[:, 1]
+    normal = (draw * scale).T @ (draw * scale)
+    found = parameter_covariance(SimpleNamespace(normal=normal, rows=100, cost=3.7))
+    size = np.sqrt(np.diag(normal))
+    expected = np.linalg.pinv(normal / np.outer(size, size), rcond=1e-10) / np.outer(size, size) * 3.7 / 97
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+    few = parameter_covariance(SimpleNamespace(normal=np.diag([4.0, 9.0]), rows=2, cost=1.5))
+    np.testing.assert_allclose(few, np.diag([0.375, 1.5 / 9]))
+
+
+def test_a_record_of_periods_is_modelled_by_each_of_its_whole_periods():
+    """Two periods and a half, of drives that differ; a record without a period begins at rest."""
+    model = ModalModel(
+        np.array([-50.0 + 0j]), np.array([[1.0, 2.0]]) + 0j, np.array([[30.0]]) + 0j, np.array([[0.5, 0.0]])
+    )
+    drive = philox(5).standard_normal((50, 2)) + 3.0
+    record = Recording("r", "", drive, philox(6).standard_normal((50, 1)), 100.0, ("u", "v"), ("y",), 20)
+    parts = np.concatenate([simulate_periodic(model, drive[k : k + 20], 100.0, "first-order") for k in (0, 20)])
+    error = output_error(model, record, "first-order", steady=True, drop=7)
+    expected = (record.output[:40] - parts)[7:]
+    np.testing.assert_allclose(error, expected - expected.mean())
+    rest = record.output - simulate(model, drive - drive[0], 100.0, "zero-order")
+    np.testing.assert_allclose(output_error(model, record), rest - rest.mean())
+    single = output_error(model, replace(record, period_samples=None), steady=True)
+    whole = record.output - simulate_periodic(model, drive, 100.0)
+    np.testing.assert_allclose(single, whole - whole.mean())
+
+
+def test_orders_that_are_given_are_told_rising_and_each_once():
+    freq = np.arange(1.0, 9.0)
+    assert fit_module.given_orders(freq, [6, 2, 6, 4]) == [2, 4, 6]
+    assert fit_module.given_orders(freq, np.int64(3)) == [3]
+    for orders, message in (
+        ([], "no order was given to choose from; name at least one number of states."),
+        ([3, 8, 9], "8 frequencies cannot fix 9 poles; give at least 10 frequencies or a lower order."),
+        ([3, 0, -1], "the order is -1; give at least one pole."),
+    ):
+        with pytest.raises(IdentificationError) as caught:
+            fit_module.given_orders(freq, orders)
+        assert str(caught.value) == message
+
+
+def test_an_order_is_scored_by_what_it_leaves_of_each_output_and_drive():
+    """Two outputs and two drives at three lines: distance over variance, twice."""
+    freq = np.array([5.0, 7.0, 11.0])
+    model = ModalModel(
+        np.array([-9.0 + 0j]), np.array([[1.0, 2.0]]) + 0j, np.array([[3.0], [4.0]]) + 0j, np.ones((2, 2))
+    )
+    draw = philox(2).standard_normal((2, 3, 2, 2))
+    error = draw[0] + 1j * draw[1]
+    power = np.array([[2.0, 0.5j], [-0.5j, 3.0]]) * np.array([1.0, 2.0, 4.0])[:, None, None]
+    variance = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
+    spread = np.diagonal(np.linalg.inv(power), axis1=1, axis2=2).real
+    response = SimpleNamespace(
+        freq_hz=freq,
+        response=model.response(freq, "zero-order", 100.0) + error,
+        hold="zero-order",
+        rate_hz=100.0,
+        drive_power=power,
+        standard_error=np.sqrt(variance[:, :, None] * spread[:, None, :]),
+    )
+    distance = np.array([[(error[f, o] @ power[f] @ error[f, o].conj()).real for o in (0, 1)] for f in range(3)])
+    chi = 2 * np.sum(distance / variance)
+    for direct, parameters in ((True, 8), (False, 4)):
+        score = fit_module._score(response, SimpleNamespace(model=model), direct)
+        assert (score.order, score.parameters, score.freedom) == (1, parameters, 24 - parameters)
+        assert score.chi_square == pytest.approx(chi)
+        assert score.criterion == pytest.approx(chi + parameters * np.log(24))
+        assert score.output_error_rms == pytest.approx(np.sqrt(distance.sum() / 2))
+
+
+def test_a_gain_that_is_extrapolated_is_told_in_full_for_the_largest_of_several_elements():
+    dc, edge = np.array([[1.0, -2.0], [9.87654321, 4.0]]), np.array([[1.1, 2.0], [7.65432, 4.0]])
+    errors = 0.01 * np.array([[1.0, 2.0], [34.7, 4.0]])
+    roots = np.empty(0, dtype=complex)
+    known = Uncertainty(roots, np.empty(0), roots, np.empty(0), dc, errors, edge, errors / 10, 0.0)
+    assert range_warnings(known, (2.5, 900.0)) == (
+        "the gain at zero frequency, 9.88 ± 0.35, is extrapolated: at 2.5 Hz, the lowest excited frequency, it is "
+        "7.654 ± 0.035; use the latter.",
+    )
+
+
+@pytest.mark.parametrize("drop", [(0,), (1, 2)])
+def test_errors_of_poles_and_gains_are_those_of_differences(drop):
+    """A real pole and two pairs, two outputs and two drives; every number with an error of its own."""
+    draw = philox(9).standard_normal((4, 3, 2))
+    poles = np.array([-60.0 + 0j, -20 + 300j, -45 + 700j])
+    b, c = draw[0] + 1j * draw[1], (draw[2] + 1j * draw[3]).T
+    b[0], c[:, 0] = b[0].real, c[:, 0].real
+    kept = np.delete(np.arange(3), drop)
+    model = ModalModel(poles[kept], b[kept], c[:, kept], np.array([[0.5, -1.0], [2.0, 0.25]]))
+    numbers = pack(model, True)
+    root = 0.01 * philox(4).standard_normal((numbers.size, numbers.size)) * np.maximum(np.abs(numbers), 0.1)
+    covariance = root.T @ root
+    known = uncertainty(model, covariance, True, edge_hz=11.0, below_rad_s=1e5)
+
+    def quantities(v):
+        own = unpack(v, model)
+        gains = own.response(np.array([0.0, 11.0]))
+        return np.concatenate(
+            [own.poles_rad_s.real, own.poles_rad_s.imag, gains[0].real.ravel(), np.abs(gains[1]).ravel()]
+        )
+
+    jacobian = central_differences(quantities, numbers, 1e-6 * np.maximum(np.abs(numbers), 1.0))
+    variance = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
+    n = kept.size
+    np.testing.assert_allclose(known.poles_error_rad_s[:n] ** 2, variance[:n] + variance[n : 2 * n], rtol=1e-6)
+    np.testing.assert_allclose(known.dc_gain_error.ravel() ** 2, variance[2 * n : 2 * n + 4], rtol=1e-5)
+    np.testing.assert_allclose(known.edge_gain_error.ravel() ** 2, variance[2 * n + 4 :], rtol=1e-5)
+    np.testing.assert_allclose(
+        np.concatenate([known.dc_gain.ravel(), known.edge_gain.ravel()]), quantities(numbers)[2 * n :]
+    )

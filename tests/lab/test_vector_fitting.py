@@ -1,15 +1,20 @@
 """Vector fitting and the modal form behind each hold: exact recoveries, stability, and refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from microrad.core import lti
+from microrad.lab.identify.linear import modal, vector_fitting
 from microrad.lab.identify.linear.modal import (
     ModalModel,
     filtered,
     hold_basis,
     hold_step,
+    late,
     order_modes,
+    rank_one_modes,
     simulate,
     simulate_periodic,
 )
@@ -242,3 +247,143 @@ def test_a_fit_ends_when_it_is_exact_whatever_the_size_of_its_weights(factor):
     assert fit.converged
     assert 1 < fit.iterations < 30
     np.testing.assert_allclose(fit.response(freq), truth, rtol=1e-8, atol=1e-8 * np.abs(truth).max())
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def told(function, *given, **words):
+    with pytest.raises(IdentificationError) as caught:
+        function(*given, **words)
+    return str(caught.value)
+
+
+def test_what_a_vector_fit_cannot_use_is_told_in_full():
+    freq, flat = np.array([1.0, 2.5, 4.0, 8.0]), np.ones((4, 2, 3), dtype=complex)
+    spoilt = flat.copy()
+    spoilt[2, 1, 2] = spoilt[3, 0, 0] = np.nan
+    assert told(vector_fit, freq, spoilt, 2) == "the response at 4 Hz is not finite; leave it out."
+    assert told(vector_fit, freq, flat, 4) == (
+        "4 frequencies cannot fix 4 poles; give at least 5 frequencies or a lower order."
+    )
+    assert told(vector_fit, freq, flat, -3) == "the order is -3; give at least one pole."
+    assert told(vector_fit, freq, flat, 2, hold="first-order") == (
+        "a first-order hold needs the sample rate; give rate_hz."
+    )
+    assert told(vector_fit, freq[::-1], flat, 2, hold="zero-order", rate_hz=16.0) == (
+        "the response reaches 8 Hz, half the sample rate of 16 Hz or more; leave that out."
+    )
+
+
+def test_poles_begin_as_dense_as_the_frequencies():
+    freq = np.array([40.0, 1.0, 3.0, 10.0, 4.0])
+    found = vector_fitting.starting_poles(freq, 5) / (2 * np.pi)
+    np.testing.assert_allclose(found[0], -4.0)
+    np.testing.assert_allclose(found[1:3], np.array([3.0, 10.0]) * (-0.01 + 1j))
+    np.testing.assert_allclose(found[3:], found[1:3].conj())
+    assert vector_fitting.starting_poles(freq, 1).tolist() == [-8 * np.pi]
+    assert vector_fitting.starting_poles(freq, 2)[0] == pytest.approx(2 * np.pi * 4.0 * (-0.01 + 1j))
+
+
+def test_poles_are_real_ones_first_then_each_upper_half_and_its_conjugate():
+    given = np.array([-3 + 5j, -1.0, -2 - 7j, -9.0 + 1e-9j, -3 - 5j, -2 + 7j])
+    found = vector_fitting._symmetric(given)
+    assert found.tolist() == [-9.0, -1.0, -3 + 5j, -2 + 7j, -3 - 5j, -2 - 7j]
+
+
+def test_a_pole_goes_through_the_plane_of_its_rate_and_back():
+    poles = np.array([-30.0 + 200j, -400.0, -1e-9])
+    plane = vector_fitting._to_plane(poles, 100.0)
+    np.testing.assert_allclose(plane, 100.0 * np.expm1(poles / 100.0))
+    np.testing.assert_allclose(vector_fitting._to_pole(plane, 100.0), poles, rtol=1e-9, atol=1e-12)
+    assert vector_fitting._to_pole(np.array([-150.0 + 0j, -100.0]), 100.0) == pytest.approx(
+        [100.0 * np.log(0.5), 100.0 * np.log(1e-12)]
+    )
+    assert vector_fitting._to_plane(poles, None) is poles is vector_fitting._to_pole(poles, None)
+
+
+def test_how_far_poles_have_moved_is_counted_in_their_decays():
+    before = np.array([-5.0 + 0j, -2 + 30j, -2 - 30j])
+    after = np.array([-4.0 + 0j, -2.5 + 30j, -2.5 - 30j])
+    of_pair = abs(abs(-2 + 30j) - abs(-2.5 + 30j)) / 2.5 + 0.2
+    of_real = 0.25 + 0.25
+    assert vector_fitting._moved_by(before, after) == pytest.approx(max(of_pair, of_real))
+    assert vector_fitting._moved_by(before, np.array([-4.0 + 0j, -2.5, -3.0])) == np.inf
+    assert vector_fitting._moved_by(before, before[[2, 1, 0]][::-1]) == 0.0
+
+
+def test_residues_of_several_elements_have_the_rank_of_their_modes():
+    poles = np.array([-3.0 + 0j, -1 + 9j])
+    residues = np.array([[[2.0, -4.0, 6.0], [1.0, -2.0, 3.0]], [[1 + 1j, 0.0, 2.0], [0.0, 3.0, 1j]]])
+    direct = np.arange(6.0).reshape(2, 3)
+    model = rank_one_modes(poles, residues, direct)
+    assert (model.poles_rad_s.tolist(), model.order, model.real_poles) == ([-3.0, -1 + 9j, -1 + 9j], 5, 1)
+    s = np.array([0.5j, 4j])
+    expected = direct + sum(
+        r / (s[:, None, None] - p)
+        for p, r in [(-3.0, residues[0]), (-1 + 9j, residues[1]), (-1 - 9j, residues[1].conj())]
+    )
+    np.testing.assert_allclose(model.response(s.imag / (2 * np.pi)), expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        np.linalg.norm(model.input_vectors, axis=1), np.linalg.norm(model.output_vectors, axis=0)
+    )
+    assert rank_one_modes(poles, residues, direct, most=1).poles_rad_s.tolist() == [-3.0, -1 + 9j]
+    found = model.state_space()
+    np.testing.assert_allclose(
+        [found.C @ np.linalg.solve(v * np.eye(5) - found.A, found.B) + found.D for v in s], expected, rtol=1e-12
+    )
+
+
+def test_modes_are_ordered_real_ones_first_then_by_frequency_and_each_is_balanced():
+    poles = np.array([-1 + 20j, -50.0, -2 + 3j, -0.5])
+    inputs = np.array([[3.0, 4.0], [0.0, 2.0], [0.0, 0.0], [1.0, 0.0]], dtype=complex)
+    outputs = np.array([[20.0, 8.0, 7.0, 0.0]], dtype=complex)
+    model = order_modes(poles, inputs, outputs, np.zeros((1, 2)))
+    assert model.poles_rad_s.tolist() == [-0.5, -50.0, -2 + 3j, -1 + 20j]
+    np.testing.assert_allclose(model.input_vectors, [[1.0, 0.0], [0.0, 4.0], [0.0, 0.0], [6.0, 8.0]])
+    np.testing.assert_allclose(model.output_vectors, [[0.0, 4.0, 7.0 / np.sqrt(7.0), 10.0]])
+
+
+@pytest.mark.parametrize("samples", [2.0, -3.0, 0.5, 1.25, -0.75])
+def test_a_polynomial_is_late_exactly_and_rests_before_its_begin_and_behind_its_end(samples):
+    time = np.arange(60.0)
+    signal = np.column_stack([1 + 0.1 * time, (time / 30 - 1) ** 5])
+    found = late(signal, samples)
+    inner = slice(15, 45)
+    at = time - samples
+    np.testing.assert_allclose(found[inner], np.column_stack([1 + 0.1 * at, (at / 30 - 1) ** 5])[inner], atol=1e-9)
+    assert found.shape == signal.shape
+    if samples == 2.0:
+        assert found[:3, 0].tolist() == pytest.approx([1.0, 1.0, 1.0])
+    if samples == -3.0:
+        assert found[-4:, 0].tolist() == pytest.approx([signal[-1, 0]] * 4)
+
+
+def test_a_delayed_model_simulates_later_whether_it_repeats_or_not():
+    """Two outputs and a direct term; the delay is two and a half samples."""
+    poles = np.array([-40.0 + 0j, -20 + 300j])
+    model = ModalModel(poles, np.array([[2.0], [1 + 1j]]), np.array([[3.0, 1j], [0.5, 2.0]]), np.array([[0.3], [-0.2]]))
+    turn = 2 * np.pi * np.arange(200) / 200
+    drive = (np.sin(3 * turn) + 0.5 * np.cos(7 * turn + 1.0))[:, None]
+    whole = np.tile(drive, (4, 1))
+    for hold in ("zero-order", "first-order"):
+        plain = simulate(model, whole, 1000.0, hold)
+        behind = simulate(replace(model, delay_s=2.5e-3), whole, 1000.0, hold)
+        np.testing.assert_allclose(behind[100:780], late(plain, 2.5)[100:780], atol=1e-9)
+        periodic = simulate_periodic(replace(model, delay_s=2.5e-3), drive, 1000.0, hold)
+        np.testing.assert_allclose(behind[600:780], periodic[:180], atol=1e-4)
+        assert behind.shape == (800, 2)
+
+
+@pytest.mark.parametrize("pole", [-0.3, -1e-7, 0.2 + 0.4j, -3 + 2j, -0.4999j, -0.5001j])
+def test_functions_of_a_step_are_those_of_their_integrals(pole):
+    """phi1 is the mean of e^(a x) over the step, and phi2 that with the weight 1 - x; the slopes take x e^(a x)."""
+    x, weights = np.polynomial.legendre.leggauss(40)
+    x, weights = (x + 1) / 2, weights / 2
+    grown = np.exp(pole * x)
+    expected = [
+        np.exp(pole),
+        weights @ grown,
+        weights @ (x * grown),
+        weights @ ((1 - x) * grown),
+        weights @ ((1 - x) * x * grown),
+    ]
+    np.testing.assert_allclose([v[0] for v in modal._phi(np.array([pole], dtype=complex))], expected, rtol=1e-11)
