@@ -659,6 +659,8 @@ def test_a_peak_is_as_high_as_its_vectors_over_its_decay_and_lies_in_the_band():
         one = fit_of([1.0], poles, [1.0] * 4, [0.0] * 3, band=band)
         other = fit_of([2.0], poles, [1.0] * 4, [0.0] * 3, band=band)
         assert amplitude_dependence([one, other]).resonance_hz == pytest.approx([main, main])
+    far = fit_of([2.0], [-9.0, turn * (-1 + 300j)], [1.0] * 4, [0.0] * 2)  # no real pole is a resonance
+    assert amplitude_dependence([one, far]).resonance_hz == pytest.approx([200.0, 300.0])
     without = fit_of([1.0], poles, [1.0] * 4, [0.0] * 3, band=(50.0, 100.0))
     with pytest.raises(IdentificationError) as caught:
         amplitude_dependence([without, without])

@@ -2,7 +2,7 @@
 
 import pickle
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,10 +28,13 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
+from microrad.lab.identify.records import si_records
 from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import correlation, propagated
+from microrad.lab.identify.statistics import propagated
+from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mirror
@@ -952,3 +955,311 @@ def test_a_tie_goes_to_the_admissible_model_however_many_parameters_it_has():
 def test_what_does_not_vary_is_correlated_with_nothing():
     assert_array_equal(correlation(np.diag([4.0, 0.0])), np.diag([1.0, 0.0]))
     assert_allclose(correlation(np.array([[4e-24, -1e-18], [-1e-18, 1e-12]])), [[1.0, -0.5], [-0.5, 1.0]])
+
+
+# ------------------------------------------------------------------------------------------ the candidates, by hand
+def of(samples, name="r", *, drive=None, rate_hz=50.0, sha256=None, role=""):
+    """A record of noise, every number its own."""
+    draw = philox(samples)
+    drive = draw.standard_normal(samples) + 4.0 if drive is None else np.asarray(drive, dtype=float)
+    output = draw.standard_normal(drive.size)
+    digest = name if sha256 is None else sha256
+    return Recording(name, digest, drive[:, None], output[:, None], rate_hz, ("u",), ("y",), role=role)
+
+
+def candidates_of(**given):
+    """Two loops, each with its own split, a record for validation and a broadband one."""
+    loops = [of(400, "a"), of(300, "b")]
+    made = {
+        "loops": loops,
+        "splits": [250, 170],
+        "heads": [loops[0].first(250), loops[1].first(170)],
+        "validation": (of(220, "v"),),
+        "broadband": [of(500, "w")],
+        "linear": None,
+        "units": Units("mV", "um", 0.5),
+        "span_rad": 2.0,
+        "seed": 7,
+        "admissible": True,
+        "hold": "first-order",
+    }
+    return candidates.Candidates(**made | given)
+
+
+def test_all_is_judged_by_loops_from_their_splits_on_and_by_validation_from_its_begin(monkeypatch):
+    one = candidates_of()
+    assert [r.path for r in one.recordings] == ["a", "b", "v"] and one.all_splits == [250, 170, 0]
+    monkeypatch.setattr(candidates, "predict", lambda *given: (given[0], given[1].path, given[2]))
+    assert one.predict("fit") == (("fit", "a", 250), ("fit", "b", 170), ("fit", "v", 0))
+
+
+def test_a_score_is_of_all_samples_together_in_per_cent_of_the_span():
+    """Fitted: 3 and 4 of the first loop, 5 of the second one. Unseen: 6, 7, and 8 and 9 of validation."""
+    left = [([99.0, 3.0, -4.0, 6.0], 1, 3), ([99.0, 99.0, 5.0, -7.0], 2, 3), ([99.0, 99.0, 8.0, 9.0], 2, 2)]
+    seen = [predictions.Prediction(np.zeros(4), np.array(values), *at, 0) for values, *at in left]
+    score = candidates_of().score("m", seen)
+    assert score.model == "m"
+    assert (score.fit_rms_percent, score.fit_peak_percent) == pytest.approx((50 * np.sqrt(50 / 3), 250.0))
+    assert (score.held_out_rms_percent, score.held_out_peak_percent) == pytest.approx((50 * np.sqrt(230 / 4), 450.0))
+    scored = candidates_of().scored(SimpleNamespace(name="m"), tuple(seen))
+    assert (scored.model, scored.score, scored.predictions) == ("m", score, tuple(seen))
+    assert [r.path for r in scored.recordings] == ["a", "b", "v"]
+
+
+def test_each_kind_of_model_is_fitted_with_what_belongs_to_it(monkeypatch):
+    given = {}
+
+    def kept(name):
+        return lambda *args, **words: given.update({name: (args, words)}) or f"the {name}"
+
+    for name in ("fit_prandtl_ishlinskii", "fit_bouc_wen", "fit_joint"):
+        monkeypatch.setattr(candidates, name, kept(name))
+    one, told = candidates_of(), []
+
+    def progress(*args):
+        told.append(args)
+
+    assert one._fit("prandtl_ishlinskii", "poles", progress) == "the fit_prandtl_ishlinskii"
+    assert given.pop("fit_prandtl_ishlinskii") == ((one.heads,), {"units": one.units})
+    assert told == [(1, 1, "play operators")]
+    assert one._fit("bouc_wen_admissible", "poles", progress) == "the fit_bouc_wen"
+    words = {"starts": 12, "seed": 7, "admissible": True, "on_progress": progress, "units": one.units}
+    assert given.pop("fit_bouc_wen") == ((one.heads,), words) and "_static_start" not in vars(one)
+    assert one._fit("bouc_wen", "poles", progress) == "the fit_bouc_wen" == vars(one)["_static_start"]
+    assert given.pop("fit_bouc_wen") == ((one.heads,), words | {"admissible": False})
+    assert one._fit("bouc_wen_creep", "poles", progress) == "the fit_joint"
+    joint = {"linear": "poles", "admissible": True, "static": "the fit_bouc_wen", "hold": "first-order", "seed": 7}
+    assert given.pop("fit_joint") == ((one.heads, "bouc_wen_creep", one.units), joint) and given == {}
+    one._fit("prandtl_ishlinskii_rate", None, progress)
+    assert given.pop("fit_joint")[1] == joint | {"static": None, "linear": None}
+    assert told[1:] == [(0, 1, "fitting bouc_wen_creep"), (0, 1, "fitting prandtl_ishlinskii_rate")]
+    begin = SimpleNamespace(name="linear", linear="its poles")
+    assert one.freed(begin, progress, evaluations=5) == "the fit_joint"
+    free = {"linear": "its poles", "free_linear": True, "admissible": True, "broadband": one.broadband}
+    free |= {"hold": "first-order", "begin": begin, "evaluations": 5}
+    assert given.pop("fit_joint") == ((one.heads, "linear", one.units), free)
+    assert told[-1] == (0, 1, "linear part, hysteresis and creep together")
+
+
+def test_fits_are_counted_by_their_starts_and_one_that_fails_is_refused(monkeypatch):
+    """Twelve starts of Eq. 3, and one of every other model."""
+
+    def fitted(self, model, poles, progress):
+        progress(3, 99, f"in {model}")
+        if model == "linear":
+            raise IdentificationError("it cannot be.")
+        return f"fit of {model}, {poles}"
+
+    monkeypatch.setattr(candidates.Candidates, "_fit", fitted)
+    told, heard = [], []
+    models = ("prandtl_ishlinskii", "bouc_wen_admissible", "linear", "bouc_wen", "bouc_wen_creep")
+    fits, failed = candidates_of().fit_all(models, lambda *args: told.append(args), heard.append)
+    assert fits == heard == [f"fit of {model}, None" for model in models if model != "linear"]
+    assert failed == [candidates.Refused("linear", "it cannot be.")]
+    assert told == [
+        (3, 27, "in prandtl_ishlinskii"),
+        (4, 27, "in bouc_wen_admissible"),
+        (16, 27, "in linear"),
+        (14, 27, "linear"),
+        (17, 27, "in bouc_wen"),
+        (29, 27, "in bouc_wen_creep"),
+        (27, 27, "bouc_wen_creep"),
+    ]
+    with pytest.raises(IdentificationError, match=r"^it cannot be\.$"):
+        candidates_of().fit_all(["linear"], lambda *_: None, heard.append)
+
+    def refused(self, model, poles, progress):
+        raise IdentificationError(f"no {model}.")
+
+    monkeypatch.setattr(candidates.Candidates, "_fit", refused)
+    with pytest.raises(IdentificationError, match=r"^no bouc_wen\.$"):
+        candidates_of().fit_all(["linear", "bouc_wen"], lambda *_: None, heard.append)
+
+
+def test_poles_of_the_linear_part_have_its_delay_and_the_error_of_that(monkeypatch):
+    found, given = LinearPoles(Roots((80.0,), (0.2,)), Roots((), ()), 3.0), []
+    monkeypatch.setattr(candidates, "poles_of", lambda *args: given.append(args) or found)
+    monkeypatch.setattr(candidates.Candidates, "_fit", lambda self, model, poles, progress: poles)
+    linear = SimpleNamespace(system="system", excited_hz=(2.0, 300.0), rate_hz=4000.0, delay_s=3e-4, delay_error_s=5e-6)
+    fits, _ = candidates_of(linear=linear).fit_all(["linear"], lambda *_: None, lambda fit: None)
+    assert fits == [replace(found, delay_s=3e-4, delay_error_s=5e-6)]
+    assert given == [("system", (2.0, 300.0), 4000.0)]
+
+
+def test_the_linear_part_is_fitted_in_volts_and_radians_from_where_the_drive_begins(monkeypatch):
+    given = []
+    monkeypatch.setattr(candidates, "fit_axis", lambda *args, **words: given.append((args, words)) or "fit")
+    one = of(6, "w", drive=[5.0, 7.0, 2.0, 5.0, 9.0, 1.0])
+    units = Units("mV", "um", 0.5)
+    assert candidates.fit_linear_part([one, one], units, ("bouc_wen", "linear"), "first-order", "told") == "fit"
+    ((scaled,), words) = given.pop()
+    assert words == {"hold": "first-order", "on_progress": "told"} and len(scaled) == 2
+    assert_allclose(scaled[1].drive[:, 0], [0.0, 2e-3, -3e-3, 0.0, 4e-3, -4e-3])
+    assert_allclose(scaled[1].output, 2e-6 * one.output)
+    assert candidates.fit_linear_part([one], units, ("bouc_wen", "prandtl_ishlinskii"), "first-order", None) is None
+    assert candidates.fit_linear_part([], units, ("linear",), "first-order", None) is None and given == []
+
+
+def test_models_that_recordings_cannot_support_are_refused_in_full():
+    records = [SimpleNamespace(drive_v=np.zeros(n), step_s=1e-3) for n in (500, 876, 100)]
+    names, refused = candidates.supported_models(
+        ["linear", "bouc_wen_creep", "bouc_wen_joint", "bouc_wen"], records, has_linear=False
+    )
+    assert names == ["bouc_wen"]
+    wide = "no recording is broadband, so there is no linear part; record a small chirp or multisine as well"
+    short = "the longest recording lasts 0.876 s, and creep shows over seconds; record a staircase of 10 s"
+    assert [(each.model, each.reason) for each in refused] == [
+        ("linear", wide),
+        ("bouc_wen_creep", short),
+        ("bouc_wen_joint", wide),
+    ]
+    with pytest.raises(IdentificationError) as caught:
+        candidates.supported_models(["bouc_wen_creep", "linear"], records, has_linear=False)
+    assert str(caught.value) == f"the recordings do not support bouc_wen_creep: {short}."
+
+
+def left(*sizes):
+    """Predictions of one record each that leave this, all of it unseen but the first of four samples."""
+    turns = np.array([9.0, 1.0, -1.0, 1.0])
+    return tuple(predictions.Prediction(np.zeros(4), size * turns, 0, 1, 0) for size in sizes)
+
+
+def test_at_most_two_within_twice_the_least_error_are_polished_the_best_first():
+    cascade, static = joint_fit_of(linear="part"), joint_fit_of(linear=None)
+    fits = [cascade, static, cascade, cascade, cascade, object()]
+    seen = [left(1.99), left(1.0), left(1.5, 0.1), left(2.01), left(1.2), left(1.1)]
+    assert candidates.within_reach(fits, seen) == [4, 2]
+    assert candidates.within_reach(fits[:4], seen[:4]) == [2, 0]
+    assert candidates.within_reach(fits[:2], [left(2.0), left(1.0)]) == [0]
+    assert candidates.within_reach(fits[:2], [left(2.001), left(1.0)]) == []
+
+
+@dataclass
+class PlantErrors:
+    """What of a fit is kept where it is not moved."""
+
+    covariance: object
+    converged: bool
+    evaluations: int
+
+
+def replaced(given, /, **changes):
+    return joint_fit_of(**vars(given) | changes)
+
+
+@pytest.mark.parametrize(("family", "worse"), [("bouc_wen", 1.0), ("bouc_wen", 3.0), ("linear", 1.0), ("linear", 3.0)])
+def test_a_model_is_fitted_once_more_and_kept_where_that_is_worse(monkeypatch, family, worse):
+    """With fewer poles first where it is a Bouc-Wen model; where it is worse it has the errors of all its numbers."""
+    asked = []
+    noise = philox(3).standard_normal(400)
+    before = (predictions.Prediction(np.zeros(400), noise, 0, 100, 0),)
+    after = (predictions.Prediction(np.zeros(400), worse * noise, 0, 100, 0),)
+
+    def freed(begin, progress, evaluations=None):
+        asked.append((begin.label, evaluations))
+        known = PlantErrors("covariance there", True, 99)
+        return replaced(begin, label=f"{begin.label} freed {evaluations}", fit=known)
+
+    fit = joint_fit_of(
+        label="fit", linear="part", form=SimpleNamespace(family=family), fit=PlantErrors("own", False, 12)
+    )
+    of_all = SimpleNamespace(freed=freed, predict=lambda free: after, linear="response")
+    monkeypatch.setattr(candidates, "_without_spare_poles", lambda of, begin, progress: replaced(begin, label="fewer"))
+    monkeypatch.setattr(candidates, "_held_covariance", lambda there, response: (there.label, response))
+    monkeypatch.setattr(
+        candidates, "replace", lambda of, **to: (replaced if of.__class__ is JointFit else replace)(of, **to)
+    )
+    found, seen = candidates.refit(of_all, fit, before, None)
+    begun = "fewer" if family == "bouc_wen" else "fit"
+    rough = [("fit", 5)] if family == "bouc_wen" else []
+    if worse == 1.0:
+        assert asked == [*rough, (begun, None)] and seen is after and found.label == f"{begun} freed None"
+        return
+    assert asked == [*rough, (begun, None), ("fit", 1)] and seen is before
+    assert found.label == "fit freed 1"
+    assert vars(found.fit) == {"covariance": ("fit freed 1", "response"), "converged": False, "evaluations": 12}
+    static = replaced(fit, linear=None)
+    assert candidates.refit(of_all, static, before, None) == (static, before)
+
+
+def test_the_best_is_polished_as_long_as_another_one_becomes_the_best(monkeypatch):
+    """Of four the first two in reach; then the third one is the best, and is polished, too; the last one stays."""
+    turns, heard = [], []
+
+    def polished(of, fit, seen, progress):
+        turns.append((fit, seen, progress))
+        return (fit, seen) if fit == "b" else (fit.upper(), f"{seen} anew")
+
+    monkeypatch.setattr(choice, "within_reach", lambda fits, seen: [1, 0])
+    monkeypatch.setattr(choice, "refit", polished)
+    monkeypatch.setattr(choice, "_best", lambda fits, seen: 2 if len(turns) < 4 else 3)
+    monkeypatch.setattr(choice, "has_linear", lambda fit: fit != "d")
+    fits, seen = ["a", "b", "c", "d"], ["of a", "of b", "of c", "of d"]
+    of_all = SimpleNamespace(scored=lambda fit, predicted: (fit, predicted))
+    assert choice._polished(of_all, fits, seen, "told", heard.append) == 2
+    assert turns == [("b", "of b", "told"), ("a", "of a", "told"), ("c", "of c", "told")]
+    assert heard == [("A", "of a anew"), ("C", "of c anew")]
+    assert fits == ["A", "b", "C", "d"] and seen == ["of a anew", "of b", "of c anew", "of d"]
+
+
+def test_what_each_recording_served_for_is_told_once_in_their_order():
+    own = candidates_of()
+    other, unused = of(90, "x"), of(80, "y")
+    found = choice._sources(own, [own.loops[1], other, unused], [other])
+    assert [(u.path, u.sha256, u.fitted, u.held_out, u.role) for u in found] == [
+        ("a", "a", 250, 150, "loops"),
+        ("b", "b", 170, 130, "loops"),
+        ("x", "x", 90, 0, "broadband"),
+        ("y", "y", 0, 0, "broadband"),
+        ("v", "v", 0, 220, "validation"),
+    ]
+
+
+def test_the_same_data_are_told_with_both_their_names_unless_their_rates_differ():
+    first, again = of(30, "a", sha256="s"), of(30, "b", sha256="s")
+    choice._check_distinct([first, replace(again, rate_hz=51.0)], [of(40, "c", sha256=""), of(40, "d", sha256="")])
+    with pytest.raises(IdentificationError) as caught:
+        choice._check_distinct([of(20, "z"), first], [again])
+    assert str(caught.value) == (
+        "b: the same data as a; give each recording once, and for validation one that is not fitted."
+    )
+
+
+def test_a_model_that_explains_less_than_half_is_told_in_full_of_several_records():
+    """Spreads of 3 and 4 about means of their own, 200 and 100 samples; a record without samples counts for nothing."""
+    turns = np.where(np.arange(200) % 2, 1.0, -1.0)
+    parts = [
+        (7.0 + 3.0 * turns, 2.0 * turns),
+        (np.zeros(0), np.zeros(0)),
+        (-9.0 + 4.0 * turns[:100], 2.5 * turns[:100]),
+    ]
+    spread, rest = np.sqrt(34 / 3), np.sqrt((8 + 6.25) / 3)
+    score = predictions.Score("m", 1.0, 1.0, 1.0, 1.0)
+    assert choice._unexplained(score, parts, "somewhere") == (
+        f"the recordings do not support a model: the chosen one, m, leaves {rest:.3g} rad rms of {spread:.3g} rad "
+        f"somewhere ({100 * rest / spread:.0f} %, at most 50 % is a model)."
+    )
+    assert choice._unexplained(score, [(m, 0.7 * r) for m, r in parts], "somewhere") == ""
+
+
+def test_a_line_has_one_slope_for_all_records_and_an_offset_for_each():
+    """From the samples that a fit uses; a record that is all unseen has its offset from behind its own transient."""
+    units = Units("mV", "um", 0.5)
+    loops = [of(200, "a"), of(120, "b")]
+    splits = [100, 80]
+    unseen = of(60, "v", drive=np.concatenate([np.zeros(10), np.linspace(0, 9, 20), np.linspace(9, 1, 40)]))
+    prepared = si_records([r.first(k) for r, k in zip(loops, splits, strict=True)], units)
+    lines = predictions.straight_line(prepared, [*loops, unseen], [*splits, 0], units)
+    columns = np.zeros((95 + 76, 3))
+    columns[:95, 0], columns[95:, 0] = 1e-3 * loops[0].drive[5:100, 0], 1e-3 * loops[1].drive[4:80, 0]
+    columns[:95, 1], columns[95:, 2] = 1.0, 1.0
+    target = 2e-6 * np.concatenate([loops[0].output[5:100, 0], loops[1].output[4:80, 0]])
+    slope, first, second = np.linalg.lstsq(columns, target, rcond=None)[0]
+    for line, record, offset in zip(lines, loops, (first, second), strict=False):
+        assert_allclose(line.model_rad, slope * 1e-3 * record.drive[:, 0] + offset, rtol=1e-8)
+        assert_allclose(line.measured_rad, 2e-6 * record.output[:, 0])
+    assert [(line.start, line.split) for line in lines] == [(5, 100), (4, 80), (30, 30)]
+    assert np.mean(lines[2].residual_rad[30:]) == pytest.approx(0.0, abs=1e-18)
+    with pytest.raises(IdentificationError) as caught:
+        predictions.predict(SimpleNamespace(units=units), loops[1], 121)
+    assert str(caught.value) == "split 121 does not lie within the 120 samples of b; give a number from 2 to that."
