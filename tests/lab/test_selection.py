@@ -1183,7 +1183,7 @@ def test_a_model_is_fitted_once_more_and_kept_where_that_is_worse(monkeypatch, f
 
 
 def test_the_best_is_polished_as_long_as_another_one_becomes_the_best(monkeypatch):
-    """Of four the first two in reach; then the third one is the best, and is polished, too; the last one stays."""
+    """Of four two are in reach; then the third one is the best, and is polished, too; then one that was already."""
     turns, heard = [], []
 
     def polished(of, fit, seen, progress):
@@ -1192,11 +1192,11 @@ def test_the_best_is_polished_as_long_as_another_one_becomes_the_best(monkeypatc
 
     monkeypatch.setattr(choice, "within_reach", lambda fits, seen: [1, 0])
     monkeypatch.setattr(choice, "refit", polished)
-    monkeypatch.setattr(choice, "_best", lambda fits, seen: 2 if len(turns) < 4 else 3)
+    monkeypatch.setattr(choice, "_best", lambda fits, seen: 2 if len(turns) < 3 else 0)
     monkeypatch.setattr(choice, "has_linear", lambda fit: fit != "d")
     fits, seen = ["a", "b", "c", "d"], ["of a", "of b", "of c", "of d"]
     of_all = SimpleNamespace(scored=lambda fit, predicted: (fit, predicted))
-    assert choice._polished(of_all, fits, seen, "told", heard.append) == 2
+    assert choice._polished(of_all, fits, seen, "told", heard.append) == 0
     assert turns == [("b", "of b", "told"), ("a", "of a", "told"), ("c", "of c", "told")]
     assert heard == [("A", "of a anew"), ("C", "of c anew")]
     assert fits == ["A", "b", "C", "d"] and seen == ["of a anew", "of b", "of c anew", "of d"]

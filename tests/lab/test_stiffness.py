@@ -16,6 +16,8 @@ from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.response import response_from_periods
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness import fit as fit_of
+from microrad.lab.identify.stiffness import model as model_of
+from microrad.lab.identify.stiffness import search as search_of
 from microrad.lab.identify.stiffness import springs as springs_of
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import (
@@ -1099,3 +1101,287 @@ def test_numbers_that_records_do_not_tell_apart_leave_unseen_errors_alone(monkey
     alone = (pulls - pulls.mean()) / matrices.sum() * np.sqrt(4 / 3)
     np.testing.assert_allclose(moved.sum(axis=1), alone, rtol=1e-3, atol=1e-3 * np.abs(alone).max())
     np.testing.assert_allclose(moved[:, 0], moved[:, 1], rtol=1e-3, atol=1e-3 * np.abs(alone).max())
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+@pytest.mark.parametrize(
+    ("change", "options", "skip", "message"),
+    [
+        (
+            {"samples": 23},
+            {},
+            2,
+            "b: the record has 2 whole periods and 2 are to be skipped; this fit needs periodic excitation "
+            "(multisines) in its steady state: give period_samples, or record more periods.",
+        ),
+        (
+            {"rate_hz": 101.0},
+            {},
+            0,
+            "b: the sample rate is 101 Hz and that of a 100 Hz; records that are fitted together must share one rate.",
+        ),
+        (
+            {},
+            {"thresholds": (0.1, 0.3, 0.2)},
+            0,
+            "the thresholds [0.1, 0.3, 0.2] do not ascend from above 0; sort them, each once, and leave out 0.",
+        ),
+        (
+            {},
+            {"thresholds": (-0.5, 0.3)},
+            0,
+            "the thresholds [-0.5, 0.3] do not ascend from above 0; sort them, each once, and leave out 0.",
+        ),
+        ({}, {"sub_steps": -2, "springs": 0}, 0, "-2 steps a sample were asked for; give at least 1."),
+        ({}, {"springs": -3}, 0, "-3 springs were asked for; give at least 1."),
+    ],
+)
+def test_what_cannot_be_fitted_is_told_in_full_for_the_second_record(change, options, skip, message):
+    first, second = small(1.0, periods=3, name="a"), small(2.0, periods=3, name="b")
+    other = second.first(change.pop("samples", 24))
+    with pytest.raises(IdentificationError) as caught:
+        fit_of._check([first, replace(other, **change)], skip, StiffnessOptions(**options))
+    assert str(caught.value) == message
+
+
+def test_a_record_is_the_mean_of_its_whole_periods_behind_those_skipped_in_units_of_the_search():
+    drive, output = np.arange(70.0).reshape(35, 2), np.arange(105.0).reshape(35, 3) ** 2
+    record = Recording("r", "", drive, output, 50.0, ("u", "v"), ("x", "y", "z"), 8)
+    steady = fit_of._steady(record, (2.0, 5.0), 3, 1)
+    np.testing.assert_allclose(steady.drive, (drive[8:16] + drive[16:24] + drive[24:32]) / 6)
+    mean = (output[8:16] + output[16:24] + output[24:32]) / 3
+    np.testing.assert_allclose(steady.output, (mean - mean.mean(axis=0)) / 5)
+    assert (steady.name, steady.rate_hz, steady.sub_steps, steady.step_s) == ("r", 50.0, 3, pytest.approx(1 / 150))
+    whole = fit_of._periods(replace(record, period_samples=None), output, 0)
+    np.testing.assert_array_equal(whole, output[None])
+    both = [record, replace(record, drive=3 * drive, output=output / 7)]
+    assert fit_of._unit(both, "drive") == pytest.approx(np.sqrt(np.mean(drive.var(axis=0)) * 5))
+    assert fit_of._unit(both, "output") == pytest.approx(np.sqrt(np.mean(output.var(axis=0)) * 25 / 49))
+
+
+def test_a_search_may_end_where_eight_steps_gained_next_to_nothing():
+    told = []
+    one = fit_of._Told(lambda *args: told.append(args), 40, 0.01)
+    one.begin(15, 4.0)
+    ends = [one(k, None, cost) for k, cost in enumerate([3.9] * 6 + [3.0, 3.922, 3.9], 1)]
+    assert ends == [False] * 7 + [True, True]
+    assert told[0] == (16, 40, "error 1.9748") and told[6] == (22, 40, "error 1.7321") and told[-1][:2] == (24, 40)
+    assert one.costs[:2] == [2.0, np.sqrt(3.9)]
+    one.begin(20, 4.0)
+    assert [one(k, None, 4.0 * 0.98**k) for k in range(1, 10)] == [False] * 9
+
+
+def test_a_start_in_units_of_the_search_is_the_same_model_with_even_vectors():
+    draw = philox(7).standard_normal((4, 3, 2))
+    poles, c = np.array([-9.0 + 0j, -2 + 30j, -3 + 70j]), 1e3 * (draw[2] + 1j * draw[3]).T
+    b = draw[0] + 1j * draw[1]
+    b[0], c[:, 0] = b[0].real, c[:, 0].real
+    start = LinearStart(ModalModel(poles, b, c, draw[0, :2]), 3e-4)
+    found = fit_of._in_units(start, (0.25, 1e-3))
+    freq = np.array([0.5, 4.0, 11.0])
+    np.testing.assert_allclose(found.model.response(freq), 250.0 * start.model.response(freq), rtol=1e-12)
+    sizes = np.linalg.norm(found.model.input_vectors, axis=1), np.linalg.norm(found.model.output_vectors, axis=0)
+    np.testing.assert_allclose(*sizes)
+    assert found.delay_s == 3e-4
+
+
+def test_a_linear_start_lies_behind_the_delay_that_is_given_or_the_best_on_the_grid(monkeypatch):
+    """Costs of nine delays, the fourth one least; no more than twenty states look for it."""
+    asked = []
+
+    def fitted(response, order, **words):
+        asked.append((float(response.response[0, 0, 0].imag), order, words))
+        return SimpleNamespace(cost=abs(len(asked) - 4), model="model")
+
+    monkeypatch.setattr(model_of, "fit_order", fitted)
+    monkeypatch.setattr(model_of, "without_delay", lambda response, delay_s, steps: replaced(delay_s, steps))
+
+    def replaced(delay_s, steps):
+        return SimpleNamespace(response=np.full((1, 1, 1), 1j * delay_s * steps))
+
+    response = SimpleNamespace(rate_hz=50.0)
+    assert model_of.linear_start(response, 28, 3, None, 5) == ("model", pytest.approx(0.015))
+    assert [(order, words) for _, order, words in asked] == [(20, {"exchanges": 0, "fine": False})] * 9 + [
+        (28, {"exchanges": 5})
+    ]
+    assert [at for at, *_ in asked] == pytest.approx([*(3 * 0.005 * k for k in range(9)), 0.045])
+    asked.clear()
+    assert model_of.linear_start(response, 6, 2, 0.0, 1) == ("model", 0.0)
+    assert asked == [(0.0, 6, {"exchanges": 1})]
+
+
+def test_the_mirror_of_numbers_has_pairs_before_real_poles_and_each_operator_its_own(numbers):
+    two = replace(
+        numbers,
+        decay=np.array([-30.0, -50.0, -100.0]),
+        frequency=np.array([600.0, 200.0]),
+        B=np.arange(10.0).reshape(5, 2),
+        E=np.zeros((5, 4)),
+        F=np.zeros((4, 5)),
+        C=np.zeros((2, 5)),
+    )
+    plant = two.mirror("named")
+    expected = np.diag([-30.0, -30.0, -50.0, -50.0, -100.0])
+    expected[0, 1], expected[1, 0], expected[2, 3], expected[3, 2] = -600.0, 600.0, -200.0, 200.0
+    np.testing.assert_array_equal(plant.A, expected)
+    assert (plant.name, plant.bouc_wen, plant.inverse) == ("named", (), ())
+    assert [play.reach_v for play in plant.plays] == [1.0, 2.0, 3.0, 1.5]
+    for e, play in enumerate(plant.plays):
+        assert play.thresholds_v == tuple(numbers.thresholds[e]) and play.weights_rad_v == tuple(numbers.weights[e])
+        assert play.polynomial_rad == tuple(numbers.polynomial[e])
+    assert two.rows == [0, 2, 4]
+    assert two.poles.tolist() == [-30 + 600j, -50 + 200j, -100]
+    assert two.poles_at_rest == pytest.approx([-50 + 200j, -30 + 600j, -100])
+    assert two.names[:3] == tuple(f"modes.decay.{k}" for k in (1, 2, 3))
+    assert two.names[3:7] == ("modes.frequency.1", "modes.frequency.2", "matrices.B.1.1", "matrices.B.1.2")
+    assert "hysteresis.4.polynomial.3" in two.names and "hysteresis.3.weights.2" in two.names
+    assert len(two.names) == len(set(two.names)) == two.vector().size
+    again = two.at(2.0 * two.vector())
+    assert again.delay_s == 2 * numbers.delay_s and again.weights.tolist() == (2 * numbers.weights).tolist()
+    assert again.thresholds is numbers.thresholds
+
+
+def test_numbers_in_other_units_have_each_its_own_factor(numbers):
+    found = scaled(numbers, 4.0, 10.0)
+    factors = {"B": 0.25, "E": 0.25, "F": 4.0, "G": 1.0, "polynomial": 4.0, "thresholds": 4.0, "reach": 4.0}
+    factors |= {"C": 10.0, "D": 2.5, "K": 2.5, "weights": 1.0, "decay": 1.0, "frequency": 1.0}
+    for name, factor in factors.items():
+        np.testing.assert_allclose(getattr(found, name), factor * getattr(numbers, name), err_msg=name)
+    assert found.delay_s == numbers.delay_s
+
+
+def test_the_slope_of_a_polynomial_is_that_of_its_powers_within_its_reach():
+    q = np.array([[0.5, -1.5, 2.0], [1.2, -5.0, -2.5]])
+    reach, c = np.array([1.0, 4.0, np.inf]), np.array([[0.1, 0.2, 0.3], [-0.4, 0.5, 0.6], [7.0, 8.0, 9.0]])
+    found = tangents.powers(q, reach)
+    np.testing.assert_allclose(found[0], [[0.25, 0.25, 0.125], [0.140625, -0.140625, -0.052734375], [0.0] * 3])
+    np.testing.assert_allclose(found[1], [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [0.0] * 3])
+    plant = SimpleNamespace(operator=np.column_stack([np.full((3, 2), 99.0), c, reach]))
+    slope = tangents.bend(plant, SimpleNamespace(q=q))
+    step = 1e-6
+    expected = np.einsum("kei,ei->ke", tangents.powers(q + step, reach) - tangents.powers(q - step, reach), c) / (
+        2 * step
+    )
+    np.testing.assert_allclose(slope, expected, atol=1e-9)
+
+
+def test_the_shapes_of_springs_are_forces_then_outputs_then_those_with_pairs_the_other_way():
+    forces, seen = np.array([[1.0], [2.0], [3.0], [4.0]]), np.array([[5.0, 9.0], [6.0, 10.0], [7.0, 11.0], [8.0, 12.0]])
+    found = springs_of._shapes(forces, seen, 8)
+    signs = np.array([[1, 1, 1, 1], [1, -1, 1, -1], [1, 1, -1, -1]]).T
+    both = np.hstack([forces, seen])
+    np.testing.assert_array_equal(found, np.hstack([both, both * signs[:, [1]], both[:, :2] * signs[:, [2]]]))
+    alike = np.array([[1.0, -2.0, 0.0, 3.0, 0.0], [1.0, -2.0, 1.0, 3.0, 0.0]])
+    np.testing.assert_array_equal(springs_of._alike(alike, 2), [0, 1, 0, 2, 0, 0, 0])
+
+
+def limited(least, most, kinds=("phi",)):
+    """Free numbers between their limits."""
+    least, most = np.array(least), np.array(most)
+    kinds = np.array((*kinds, *kinds[-1:] * (least.size - len(kinds))))
+    return springs_of.Springs(None, 0, np.eye(least.size), np.zeros(least.size), kinds, least, most)
+
+
+def test_a_number_at_a_limit_may_move_back_and_not_beyond():
+    one = limited([0.0, 0.0, -np.inf, -np.inf, 1.0], [np.inf, np.inf, 5.0, 5.0, 3.0])
+    free = np.array([0.0, 0.0, 5.0, 5.0, 2.0])
+    assert one.loose(free, np.array([1.0, -1.0, 1.0, -1.0, 9.0])).tolist() == [False, True, True, False, True]
+    assert one.inside(free).tolist() == [False, False, False, False, True]
+    assert one.within(np.array([-1.0, 7.0, 6.0, -9.0, 0.5])).tolist() == [0.0, 7.0, 5.0, -9.0, 1.0]
+
+
+def test_softening_is_the_largest_share_of_stiffness_by_hand(numbers):
+    """One spring on two pairs of the stiffnesses (s^2 + w^2) / w: 10.4 and 5.2; it counts the sum of its plays."""
+    two = replace(
+        numbers, decay=np.array([-2.0, -1.0]), frequency=np.array([10.0, 5.0]), weights=np.array([[0.1, 0.2, 0.3]])
+    )
+    two = replace(two, F=np.array([[9.0, 2.0, 9.0, -3.0]]), polynomial=np.zeros((1, 3)))
+    springs = springs_of.Springs(two, 1, None, None, None, None, None)
+    assert springs.softening(two) == pytest.approx(0.6 * (4 / 10.4 + 9 / 5.2))
+    assert springs.redundant == 0
+    none = replace(
+        two, F=np.array([[9.0, 2.0, 9.0, 0.0]]), decay=np.array([-2.0, -1.0, -7.0]), weights=np.zeros((3, 3))
+    )
+    assert springs_of.Springs(none, 1, None, None, None, None, None).redundant == 2 + 1 + 2
+
+
+def test_the_last_steps_correct_the_inverse_curvature_over_the_loose_numbers():
+    """By the formula of Broyden, Fletcher, Goldfarb and Shanno, step after step; one that curves down counts not."""
+    draw = philox(2).standard_normal
+    size, loose = np.array([2.0, 0.5, 1.0, 4.0]), np.array([True, False, True, True])
+    root = draw((3, 3))
+    matrix, slope = root @ root.T + np.eye(3), draw(4)
+    pairs = []
+    for _ in range(3):
+        s = draw(4)
+        pairs.append((s, s * np.array([3.0, 1.0, 2.0, 5.0]) + 0.1 * draw(4)))
+    pairs.insert(1, (np.array([1.0, 0.0, 1.0, 1.0]), np.array([-1.0, 5.0, -2.0, -1.0])))
+    inverse = np.linalg.inv(matrix)
+    for s, y in pairs:
+        way, bent = (s * size)[loose], (y / size)[loose]
+        if way @ bent > 0:
+            left = np.eye(3) - np.outer(way, bent) / (way @ bent)
+            inverse = left @ inverse @ left.T + np.outer(way, way) / (way @ bent)
+    factor, damping = search_of._factor(matrix - 0.25 * np.eye(3), 0.25)
+    assert damping == 0.25
+    found = search_of._newton(factor, pairs, slope, size, loose)
+    np.testing.assert_allclose(found, inverse @ (slope / size)[loose] / size[loose], rtol=1e-9)
+
+
+def test_damping_rises_eightfold_until_there_is_a_factor():
+    matrix = np.array([[1.0, 0.0], [0.0, -3.0]])
+    factor, damping = search_of._factor(matrix, 0.01)
+    assert damping == pytest.approx(5.12)
+    np.testing.assert_allclose(np.triu(factor[0]) ** 2, np.diag([6.12, 2.12]), atol=1e-12)
+
+
+def test_the_size_of_a_number_that_hardly_acts_is_that_of_its_kind():
+    one = Search(limited([0.0] * 4, [1.0] * 4, ("phi", "phi", "weights")), [], np.ones(0), [], None)
+    found = one.size(np.diag([4.0, 0.0, 9.0, 1.0]))
+    np.testing.assert_allclose(found**2, [4.06, 0.06, 9.15, 1.15])
+    np.testing.assert_allclose(one.size(np.diag([4.0, 4.0, 0.0, 0.0])) ** 2, [4.12, 4.12, 4.12e-12, 4.12e-12])
+
+
+def test_the_curvature_of_few_records_stands_for_all_by_their_weights(monkeypatch):
+    """Of three records two, each by two ends; as many samples as 40 numbers for each count, no more than all."""
+    asked = []
+
+    def curved(plant, numbers, record, end, part, wanted):
+        asked.append((plant, numbers, record.name, end, part, wanted.tolist()))
+        return record.name * np.array([[2.0, 1.0], [1.0, 3.0]])
+
+    monkeypatch.setattr(tangents, "curvature", curved)
+    monkeypatch.setattr(tangents, "play_plant", lambda numbers, step_s: ("plant", step_s))
+    springs = SimpleNamespace(matrix=np.array([[1.0, 0.0], [0.0, 0.0], [2.0, 5.0]]), numbers=lambda free: "numbers")
+    records = [
+        SimpleNamespace(name=k, step_s=0.5, output=np.zeros((samples, 2)))
+        for k, samples in ((1, 10), (10, 60), (100, 90))
+    ]
+    one = Search(springs, records, np.array([0.25, 0.5, 0.125]), [0, 2], SimpleNamespace(map=map))
+    found = one.curvature(np.zeros(2))
+    whole = np.array([[2.0, 1.0], [1.0, 3.0]]) * (0.25 * 1 + 0.125 * 100)
+    T = np.array([[1.0, 0.0], [2.0, 5.0]])
+    np.testing.assert_allclose(found, 2 * (0.875 / 0.375) * (T.T @ whole @ T))
+    part = 40 * 2 / 200 / 2
+    assert asked == [
+        (("plant", 0.5), "numbers", k, end, pytest.approx(part), [True, False, True])
+        for k in (1, 100)
+        for end in (0.5, 1.0)
+    ]
+
+
+def test_the_power_that_no_linear_model_follows_is_that_of_each_class_and_the_noise_of_each_record():
+    """Three records of one drive in each of two classes, three periods each: what is left of a class is one part."""
+    records = []
+    for k in range(6):
+        draw = philox(20 + k)
+        drive = np.tile(draw.standard_normal((16, 1)), (3, 1)) * (1.0 if k < 3 else 5.0)
+        output = np.column_stack([2.0 * drive, drive**2]) + (0.1 + 0.2 * k) * draw.standard_normal((48, 2))
+        records.append(Recording(f"r{k}", "", drive, output, 100.0, ("u",), ("y", "z"), 16))
+    classes = [0, 0, 0, 1, 1, 1]
+    noise = np.array([np.mean(np.var(r.output.reshape(3, 16, 2), axis=0, ddof=1)) / 3 for r in records])
+    left = [response_from_periods(records[k : k + 3]).residual_power.sum(axis=0).mean() for k in (0, 3)]
+    distortion = [max(left[c] - noise[3 * c : 3 * c + 3].mean(), 0.0) for c in (0, 1)]
+    expected = np.repeat(distortion, 3) + noise
+    np.testing.assert_allclose(_expected_squares(records, classes, 0), expected, rtol=1e-9)
+    assert distortion[1] > distortion[0] >= 0.0
