@@ -13,7 +13,7 @@ from scipy.signal import chirp, lsim
 from microrad.lab.identify.hysteresis.joint import JointFit, fit_joint
 from microrad.lab.identify.hysteresis.plant_fit import coloured_scatter, held
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
-from microrad.lab.identify.linear import axis, pole_zero
+from microrad.lab.identify.linear import axis, modal, pole_zero
 from microrad.lab.identify.linear.axis import fit_axis
 from microrad.lab.identify.linear.fit import OrderScore
 from microrad.lab.identify.linear.modal import late
@@ -406,3 +406,244 @@ def test_a_fit_whose_poles_are_all_creep_or_far_beyond_the_band_begins_with_one_
         fit = problem.fitted(start)
         assert fit.gains[0] == pytest.approx(GAIN, rel=2e-2)
         assert fit.at.poles[0].frequency_hz > 2 * flat.excited_hz[1]
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+TURN = 2 * np.pi
+
+
+def problem_of(lags=(0.02, 0.3), hold="first-order", lowest=2.0, highest=50.0, seed=1, lines=40):
+    """A response of noise at forty lines, every number its own; errors and powers differ from line to line."""
+    draw, freq = philox(seed), np.geomspace(lowest, highest, lines)
+    values = (draw.standard_normal(lines) + 1j * draw.standard_normal(lines))[:, None, None]
+    error = (0.1 + draw.random(lines))[:, None, None]
+    response = SimpleNamespace(
+        freq_hz=freq,
+        response=values,
+        standard_error=error,
+        drive_power=(1.0 + draw.random(lines))[:, None, None] + 0j,
+        hold=hold,
+        rate_hz=200.0,
+        excited_hz=(lowest, highest),
+    )
+    return PoleZeroProblem(response, lags, 4.0), response
+
+
+AT = PoleZero((Root(30.0, 0.2), Root(12.0, None), Root(70.0, None)), (Root(-45.0, None), Root(20.0, -0.1)), 3e-3)
+
+
+def test_numbers_of_a_search_are_those_of_poles_then_zeros_then_the_delay():
+    problem, _ = problem_of()
+    numbers = problem.pack(AT)
+    expected = [math.log(0.6), 0.2, math.log(0.24), math.log(1.4), -50 / 45, math.log(0.4), -0.1, TURN * 50.0 * 3e-3]
+    assert_allclose(numbers, expected)
+    again = problem.unpack(numbers, AT)
+    assert again.delay_s == pytest.approx(3e-3)
+    for one, other in zip((*again.poles, *again.zeros), (*AT.poles, *AT.zeros), strict=True):
+        assert one.frequency_hz == pytest.approx(other.frequency_hz) and one.damping == pytest.approx(other.damping)
+    flat = problem.unpack(np.where(np.arange(8) == 4, -1e-12, numbers), AT)
+    assert flat.zeros[0].frequency_hz == pytest.approx(-50e9)
+    low, high = problem.bounds(AT)
+    slow, far, near, real = 25.0, math.log(5.0), math.log(2 / 50), math.log(1 / (TURN * 0.02) / 50)
+    assert_allclose(low, [near, 1e-4, real, real, -slow, near, -0.9999, -TURN * 50 / 200])
+    assert_allclose(high, [far, 0.9999, far, far, slow, far, 0.9999, TURN * 0.5])
+    assert AT.count == 8
+
+
+def test_roots_have_their_states_their_delay_and_their_values():
+    pair, real = Root(30.0, 0.6), Root(-5.0, None)
+    assert (pair.states, real.states, pair.size_hz, real.size_hz) == (2, 1, 30.0, 5.0)
+    assert pair.delay_s == pytest.approx(1.2 / (TURN * 30)) and real.delay_s == pytest.approx(-1 / (TURN * 5))
+    assert_allclose(pole_zero.root_values([pair, real]), TURN * np.array([-18 + 24j, -18 - 24j, 5.0]))
+    for root in (pair, real, Root(7.0, -0.25)):
+        again = pole_zero._root(root.values[0])
+        assert again.frequency_hz == pytest.approx(root.frequency_hz)
+        assert again.damping == (None if root.damping is None else pytest.approx(root.damping))
+
+
+def response_by_hand(at, freq, gain=1.0):
+    """Product form, of gain 1 at rest, behind the delay."""
+    s, found = 1j * TURN * freq, np.ones(freq.size, dtype=complex)
+    for root in pole_zero.root_values(at.poles):
+        found /= 1 - s / root
+    for root in pole_zero.root_values(at.zeros):
+        found *= 1 - s / root
+    return gain * found * np.exp(-s * at.delay_s)
+
+
+def test_a_response_of_poles_and_zeros_has_a_gain_of_one_at_rest_and_lags_beside_it():
+    freq = np.array([0.0, 3.0, 25.0, 80.0])
+    assert_allclose(pole_zero.sampled(AT, freq, "band-limited", None), response_by_hand(AT, freq), rtol=1e-10)
+    model = pole_zero.modes_of(AT, -2.5, (0.3, -0.1), (0.02, 0.5))
+    lags = 0.3 / (1 + 2j * np.pi * freq * 0.02) - 0.1 / (1 + 2j * np.pi * freq * 0.5)
+    expected = response_by_hand(AT, freq, -2.5) + lags * np.exp(-2j * np.pi * freq * 3e-3)
+    assert_allclose(model.response(freq)[:, 0, 0], expected, rtol=1e-10)
+    assert (model.delay_s, model.order) == (3e-3, 6)
+    assert pole_zero.modes_of(AT, 1.0, (), ()).order == 4
+
+
+def test_what_is_left_of_a_response_is_the_least_over_gain_loss_and_lags_whose_weights_count():
+    problem, response = problem_of()
+    freq, values = response.freq_hz, response.response[:, 0, 0]
+    shape = pole_zero.sampled(AT, freq, "first-order", 200.0)
+    lags = pole_zero.modes_of(AT, 0.0, (1.0, 0.0), (0.02, 0.3)).response(freq, "first-order", 200.0)
+    assert problem.values == 80
+    weight = problem.root_weight
+    columns = problem.columns(AT)
+    assert columns.shape == (82, 4)
+    assert_allclose(columns[:40, 0] + 1j * columns[40:80, 0], weight * shape)
+    assert_allclose(columns[:40, 1] + 1j * columns[40:80, 1], 1j * weight * shape)
+    undelayed = lags[:, 0, 0] * np.exp(2j * np.pi * freq * 3e-3)
+    assert_allclose(columns[:40, 2] + 1j * columns[40:80, 2], weight * undelayed, rtol=1e-9)
+    middle = np.median(np.abs(values))
+    assert_allclose(columns[80:], [[0, 0, 1 / middle, 0], [0, 0, 0, 1 / middle]], atol=1e-12)
+    target = np.concatenate([(weight * values).real, (weight * values).imag, [0.0, 0.0]])
+    gains, *_ = np.linalg.lstsq(columns, target, rcond=None)
+    assert_allclose(problem.linear(AT), gains, rtol=1e-8)
+    assert_allclose(problem.residual(AT), target - columns @ gains, atol=1e-9)
+    left = (target - columns @ gains)[:80].reshape(2, 40) / weight
+    power = response.drive_power[:, 0, 0].real
+    assert problem.output_error_rms(AT) == pytest.approx(np.sqrt(np.sum(left**2 * power)))
+    twice = replace(AT, poles=(Root(30.0, None), Root(30.0, None), Root(40.0, None)), zeros=())
+    with np.errstate(all="ignore"):
+        assert_allclose(problem.residual(twice), target)
+
+
+def test_the_noise_of_a_line_is_the_mean_of_its_neighbours_and_what_no_model_explains_makes_it_worth_less():
+    problem, response = problem_of()
+    freq, power = response.freq_hz, response.drive_power[:, 0, 0].real
+    noise = response.standard_error[:, 0, 0] ** 2 * power
+
+    def near(values, factor):
+        found = []
+        for k, f in enumerate(freq):
+            inside = [j for j in range(40) if f / factor <= freq[j] <= f * factor or abs(j - k) <= 10]
+            found.append(np.mean(values[min(inside) : max(inside) + 1]))
+        return np.array(found)
+
+    assert_allclose(problem.root_weight, np.sqrt(2 * power / near(noise, 1.1)), rtol=1e-9)
+    less = problem.worth_less(AT)
+    squares = np.sum(problem.residual(AT)[:80].reshape(2, 40) ** 2, axis=0) / 2
+    assert_allclose(less.root_weight, problem.root_weight / np.sqrt(np.maximum(near(squares, 2.0), 1.0)), rtol=1e-9)
+    assert_allclose(less.residual(AT) @ less.columns(AT), np.zeros(4), atol=1e-7)
+    assert_allclose(problem.root_weight, problem_of()[0].root_weight)  # the first one stays
+
+
+@pytest.mark.parametrize(
+    ("pole", "shown"),
+    [
+        (Root(0.01, None), True),
+        (Root(2.0, 0.06), False),  # rings for 1.33 s, and 4 s over pi are 1.27 s
+        (Root(2.0, 0.07), True),
+        (Root(7.9, 0.51), False),  # no faster than the fastest lag
+        (Root(8.0, 0.51), True),
+        (Root(7.9, 0.49), True),
+    ],
+)
+def test_a_record_shows_a_pair_that_rings_out_in_it_and_is_no_creep(pole, shown):
+    problem, _ = problem_of()
+    assert problem.slowest_hz == pytest.approx(1 / (TURN * 0.02))
+    assert problem.shows(pole) is shown
+    fit = pole_zero.Fitted(problem, PoleZero((pole,), (), 0.0), 123.0)
+    assert fit.parameters == pole.states + 1 + 4 and fit.freedom == 80 - fit.parameters
+    assert fit.criterion == pytest.approx(123.0 + fit.parameters * math.log(80) + (0 if shown else 1e12))
+
+
+def test_a_start_leaves_out_what_is_far_and_slow_poles_with_a_zero_and_moves_those_apart_that_coincide():
+    problem, _ = problem_of()
+
+    def rad(*hz):
+        return [TURN * complex(each) for each in hz]
+
+    start = problem.started(rad(-20, -20, -1, -260, -10 + 30j, -10 - 30j), rad(-1.5, -2.5, 251, 100, 40), 2e-3)
+    assert [(p.frequency_hz, p.damping) for p in start.poles] == [
+        (pytest.approx(20.0), None),
+        (pytest.approx(20.02), None),
+        (pytest.approx(np.sqrt(1000.0)), pytest.approx(10 / np.sqrt(1000.0))),
+    ]
+    assert [z.frequency_hz for z in start.zeros] == pytest.approx([2.5, -40.0, -100.0]) and start.delay_s == 2e-3
+    few = problem.started(rad(-20, -30), rad(-25, 100), 0.0)
+    assert [z.frequency_hz for z in few.zeros] == pytest.approx([25.0])
+
+
+def test_what_is_taken_away_leaves_its_turn_of_phase_to_the_delay():
+    less = pole_zero._less(AT, [0], [0])
+    assert (less.poles, less.zeros) == (AT.poles[1:], AT.zeros[1:])
+    assert less.delay_s == pytest.approx(3e-3 + 0.4 / (TURN * 30) + 1 / (TURN * 45))
+    assert pole_zero._less(AT, [], []) == AT
+
+
+def test_others_of_a_model_are_those_with_less_or_with_a_pole_for_a_zero():
+    at = PoleZero((Root(30.0, 0.2), Root(12.0, None), Root(90.0, None)), (Root(60.0, None), Root(11.0, None)), 0.0)
+    found = pole_zero._others(SimpleNamespace(at=at, problem=SimpleNamespace(highest_hz=100.0)))
+    told = [
+        ([p.frequency_hz for p in one.poles], [z.frequency_hz for z in one.zeros], [p.damping for p in one.poles])
+        for one in found
+    ]
+    pair, one, two = 0.2, None, None
+    assert told == [
+        ([30.0, 12.0, 90.0], [11.0], [pair, one, two]),
+        ([30.0, 12.0, 90.0], [60.0], [pair, one, two]),
+        ([12.0, 90.0, 30.0], [60.0, 11.0], [None, None, None]),
+        ([12.0, 90.0, 30.0], [11.0], [None, None, None]),
+        ([12.0, 90.0], [11.0], [None, None]),
+        ([12.0, 90.0], [], [None, None]),
+        ([30.0, 90.0], [60.0, 11.0], [pair, None]),
+        ([30.0, 90.0], [60.0], [pair, None]),
+        ([30.0, 12.0], [60.0, 11.0], [pair, None]),
+        ([30.0, 12.0], [11.0], [pair, None]),
+        ([30.0, 12.0, 90.0, 100.0], [11.0], [pair, None, None, None]),
+    ]
+    turn = {len(o.poles): o.delay_s for o in found}
+    assert turn[4] == pytest.approx(-1 / (TURN * 60) - 1 / (TURN * 100))
+
+
+def test_the_covariance_of_numbers_is_that_of_their_slopes_with_the_gain_relative():
+    problem, _ = problem_of(seed=3)
+    fit = pole_zero.Fitted(problem, AT, 1.0)
+    gains, numbers = problem.linear(AT), problem.pack(AT)
+    columns = []
+    for k in range(numbers.size):
+        step = 1e-6 * (np.arange(numbers.size) == k)
+        up, down = (problem.columns(problem.unpack(numbers + s, AT)) @ gains for s in (step, -step))
+        columns.append((up - down) / 2e-6)
+    own = problem.columns(AT)
+    columns += [gains[0] * own[:, 0], gains[0] * own[:, 1], own[:, 2], own[:, 3]]
+    J = np.column_stack(columns)
+    assert_allclose(fit.covariance(), np.linalg.inv(J.T @ J), rtol=1e-4, atol=1e-9)
+    assert_allclose(fit.gains, gains)
+    assert (fit.modes().order, fit.modes(creep=True).order) == (4, 6)
+
+
+@pytest.mark.parametrize("period", [None, 50])
+def test_an_error_is_freed_of_creep_and_offset_whatever_size_they_have(period):
+    """A lag of 10 ms and one of 100 ms are added to what a model makes; a drift where nothing repeats."""
+    one, noise = np.ones((1, 1), dtype=complex), philox(5).standard_normal((200, 1))
+    model = modal.ModalModel(np.array([-60.0 + 0j]), one, 60.0 * one, np.zeros((1, 1)))
+    lags = modal.ModalModel(
+        np.array([-100.0, -10.0]) + 0j, np.ones((2, 1)) + 0j, one * [[30.0, -2.0]], np.zeros((1, 1))
+    )
+    drive = noise if period is None else np.tile(noise[:50], (4, 1))
+    if period is None:
+        both = [modal.simulate(each, drive - drive[:1], 500.0, "first-order") for each in (model, lags)]
+        both.append(0.3 * np.arange(200.0)[:, None])
+    else:
+        ones = [modal.simulate_periodic(each, drive[:50], 500.0, "first-order") for each in (model, lags)]
+        both = [np.tile(each, (4, 1)) for each in ones]
+    own = np.zeros((200, 1))
+    own[77] = 1e-3
+    record = replace(recording_from_arrays(drive, drive, 500.0), output=sum(both) + 5.0 + own)
+    found = axis.axis_error(model, replace(record, period_samples=period), "first-order")
+    assert found.shape == (200, 1) and int(np.argmax(np.abs(found))) == 77
+    assert 0.9e-3 < found[77, 0] < 1e-3 and np.abs(np.delete(found[:, 0], 77)).max() < 1e-4
+
+
+def test_a_reason_of_an_order_is_told_in_full():
+    of = [
+        OrderScore(n, 3 * n, chi, free, c, 0.0) for n, chi, free, c in ((1, 900.0, 90, 950.0), (4, 85.5, 84, 123.456))
+    ]
+    assert axis._reason(of[1], of) == (
+        "order 4 has the least criterion, 123.5 (chi-square + parameters x ln values); squared distance over its "
+        "variance, per degree of freedom, by order: 1: 10, 4: 1.02 (1 is what a true model leaves; what no order "
+        "explains counts as noise); order 1 is worse by 827"
+    )
