@@ -1,10 +1,14 @@
 """One call from a recording to a hysteresis model with its errors, and to a measured response."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad.lab.identify import IdentificationError, fit_hysteresis, measure_frequency_response
+from microrad.lab.identify import IdentificationError, Units, fit_hysteresis, measure_frequency_response
+from microrad.lab.identify.hysteresis import alone
 from microrad.lab.identify.hysteresis.alone import STATIC_FORMS
 from microrad.lab.recording import recording_from_arrays
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
@@ -113,3 +117,75 @@ def test_periods_are_averaged_and_cut_to_a_band():
         measure_frequency_response([periodic, recording_from_arrays(drive, output, 1000.0)])
     with pytest.raises(IdentificationError, match="no recording was given"):
         measure_frequency_response([])
+
+
+def test_a_model_that_is_none_is_told_with_all_that_there_are_and_a_length_is_no_angle():
+    with pytest.raises(IdentificationError) as caught:
+        fit_hysteresis(recorded(DRIVE * 1e-6), "linear", output_unit="rad")
+    assert str(caught.value) == (
+        "no hysteresis model is called 'linear'; there are bouc_wen, prandtl_ishlinskii, bouc_wen_classical, "
+        "bouc_wen_asymmetric, bouc_wen_creep, prandtl_ishlinskii_rate, prandtl_ishlinskii_creep, "
+        "prandtl_ishlinskii_rate_creep."
+    )
+    with pytest.raises(IdentificationError, match=r"^the output is a length \(mm\) and a mirror model needs an angle"):
+        fit_hysteresis(recorded(DRIVE * 1e-6), "prandtl_ishlinskii", output_unit="mm")
+
+
+def test_each_model_is_asked_for_with_its_options_and_its_numbers_are_named(monkeypatch):
+    """Two records in mV that begin at 30 V and at 10 V."""
+    given = {}
+
+    def kept(name, fit):
+        monkeypatch.setattr(alone, name, lambda *args, **words: given.update({name: (args, words)}) or fit)
+
+    known = {"name": "own", "residual_rms_percent": 0.25, "rate_limit_v_per_s": 7.0, "samples_used": 11}
+    known["not_identified"] = [("a", "because"), ("b", "of it")]
+    kept(
+        "fit_bouc_wen",
+        SimpleNamespace(model=BOUC_WEN, values=np.arange(6.0), standard_errors=np.arange(6.0) / 10, **known),
+    )
+    weights = {"thresholds_v": np.array([0.0, 1.23456]), "weights_rad_per_v": np.array([3.0, 4.0]), "sign": -1}
+    kept(
+        "fit_prandtl_ishlinskii",
+        SimpleNamespace(model=PLAYS, standard_errors_rad_per_v=np.array([0.5, np.nan]), **weights, **known),
+    )
+    joint = object.__new__(alone.JointFit)
+    numbers = SimpleNamespace(values=np.array([8.0, 9.0]), standard_errors=np.array([0.8, 0.9]), not_identified=())
+    structure = SimpleNamespace(parameters=[SimpleNamespace(name=name) for name in ("weight at 0 V", "creep at 1 s")])
+    parts = {"fit": numbers, "structure": structure, "model": PLAYS, "creep": Creep((2e-6,), (1.0,))}
+    for key, value in (parts | {name: known[name] for name in known if name != "not_identified"}).items():
+        object.__setattr__(joint, key, value)
+    kept("fit_joint", joint)
+    both = [
+        replace(recording_from_arrays(1e3 * DRIVE, DRIVE, RATE), drive=1e3 * (DRIVE + at)[:, None])
+        for at in (0.0, -20.0)
+    ]
+    words = {"output_unit": "urad", "input_unit": "mV", "admissible": True, "seed": 5, "on_progress": print}
+    units = Units("mV", "urad")
+    fit = fit_hysteresis(both, "bouc_wen", **words)
+    asked = {"seed": 5, "admissible": True, "on_progress": print, "units": units}
+    assert given.pop("fit_bouc_wen") == ((both,), asked) and given == {}
+    assert fit.values == {"d1": 0.0, "d2": 1.0, "epsilon": 2.0, "delta": 3.0, "alpha": 4.0, "beta": 5.0}
+    assert fit.standard_errors["beta"] == 0.5 and fit.bias_v == pytest.approx(20.0)
+    assert fit.model == replace(BOUC_WEN, bias_v=fit.bias_v) and fit.creep == Creep((), ())
+    assert (fit.name, fit.residual_rms_percent, fit.rate_limit_v_s, fit.samples) == ("own", 0.25, 7.0, 11)
+    assert fit.not_identified == (("a", "because"), ("b", "of it"))
+    fit = fit_hysteresis(both[0], "prandtl_ishlinskii", **words)
+    assert given.pop("fit_prandtl_ishlinskii") == ((both[:1],), {"units": units}) and given == {}
+    assert fit.values == {"weight at 0 V": -3.0, "weight at 1.235 V": -4.0}
+    assert fit.standard_errors["weight at 0 V"] == 0.5 and np.isnan(fit.standard_errors["weight at 1.235 V"])
+    assert fit.bias_v == pytest.approx(30.0) and fit.model is PLAYS
+    fit = fit_hysteresis(both, "prandtl_ishlinskii_rate", **words)
+    asked = {"admissible": True, "seed": 5, "on_progress": print}
+    assert given.pop("fit_joint") == ((both, "prandtl_ishlinskii_rate", units), asked) and given == {}
+    assert (fit.values, fit.standard_errors["creep at 1 s"]) == ({"weight at 0 V": 8.0, "creep at 1 s": 9.0}, 0.9)
+    assert fit.creep == Creep((2e-6,), (1.0,))
+    assert [name for name, _ in fit.not_identified] == ["creep that is slower"]
+
+
+def test_a_response_begins_at_rest_at_the_bias_and_has_creep_in_it():
+    creep = Creep((3e-6, 1e-6), (0.01, 0.2))
+    fit = alone.HysteresisFit("n", PLAYS, creep, 30.0, {}, {}, (), 0.1, 5.0, 9)
+    moved = DRIVE - 30.0
+    assert_allclose(fit.response(DRIVE, 1 / RATE), PLAYS.response(moved, 1 / RATE) + creep.response(moved, 1 / RATE))
+    assert fit.admissible is PLAYS.admissible

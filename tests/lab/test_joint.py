@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from microrad.core import kernels
 from microrad.lab import bench
 from microrad.lab.identify import (
     FORMS,
@@ -21,11 +23,13 @@ from microrad.lab.identify.hysteresis import joint
 from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
 from microrad.lab.identify.hysteresis.plant_fit import FitRecord, PlantProblem, fit_plant, fit_records
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
-from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
-from microrad.lab.identify.records import centred, si_records
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, one_axis, poles_of
+from microrad.lab.identify.linear.modal import late
+from microrad.lab.identify.records import SiRecord, centred, memory, si_records
 from microrad.lab.identify.statistics import propagated
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import Creep, PrandtlIshlinskii
 from places import DATA
 from truths import behind_resonance, bouc_wen, creep, plays, recorded, small_multisine, two_sines
 
@@ -542,3 +546,188 @@ def test_standard_errors_match_the_scatter():
     assert 0.5 < scatter / reported < 2.0
     totals = np.std([sum(f.model.weights_rad_v) for f in fits], ddof=1)
     assert 0 < totals < 5e-7
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def made_of(**parts):
+    """What of a joint fit is looked at."""
+    fit = object.__new__(joint.JointFit)
+    for key, value in parts.items():
+        object.__setattr__(fit, key, value)
+    return fit
+
+
+def test_why_numbers_of_a_joint_fit_are_not_known_is_told_by_their_kind():
+    named = (
+        "weight at 2 V",
+        "widening",
+        "creep at 0.1 s",
+        "d1",
+        "d2",
+        "delta",
+        "exponent",
+        "delay",
+        "pole 2 damping",
+        "zero 1",
+    )
+    found = [(name, f"fact {k}") for k, name in enumerate((*named, "gamma over alpha"))]
+    fit = made_of(fit=SimpleNamespace(not_identified=tuple(found)), creep=Creep((1.0, 2.0), (2.5, 0.5)))
+    beyond = "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only"
+    rate = "the loops widen too little with the rate to tell; record faster loops"
+    why = (
+        "neighbouring thresholds do nearly the same; loops of more amplitudes tell them apart",
+        rate,
+        "over a short record creep looks like gain; record a staircase with long dwells",
+        "a large hysteresis or creep looks like gain; larger loops or longer records tell them apart",
+        "its effect on the output is below what is left; faster loops would show it",
+        rate,
+        "only the shape of the branches fixes it; record loops of several amplitudes",
+        "poles and zeros beyond the band turn the phase as a delay does",
+        beyond,
+        beyond,
+        "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops",
+    )
+    expected = [(name, f"{fact}; {reason}") for (name, fact), reason in zip(found, why, strict=True)]
+    slow = f"no record lasts long enough for a lag beyond 2.5 s; {why[2]}"
+    assert fit.not_identified == (*expected, ("creep that is slower", slow))
+    assert made_of(fit=fit.fit, creep=Creep((), ())).not_identified == tuple(expected)
+    linear = LinearPoles(Roots((150.0,), (0.35,)), Roots((), ()), 3.0, 7e-4)
+    assert (made_of(linear=linear).delay_s, made_of(linear=None).delay_s) == (7e-4, 0)
+    assert made_of(structure=SimpleNamespace(parameters=(1, 2, 3))).parameter_count == 3
+
+
+@pytest.mark.parametrize("hold", ["zero-order", "first-order"])
+def test_a_response_of_a_joint_fit_is_about_the_first_drive_value_and_behind_its_delay(hold):
+    """A gain behind one lag of 20 ms, four samples and a half later; a drive of steps."""
+    linear = LinearPoles(Roots((1 / (2 * math.pi * 0.02),), (1.0,)), Roots((), ()), 1e-6, 4.5e-3)
+    plant = mirror.assemble("m", "cascade", linear.system, PrandtlIshlinskii((0.0,), (3.0,)))
+    fit = made_of(mirror=plant, linear=linear, hold=hold, model=PrandtlIshlinskii((0.0,), (3.0,)))
+    drive = 7.0 + np.sin(np.arange(300) / 25.0) + 0.3 * np.sin(np.arange(300) / 11.0)
+    found, clamped = fit.response(drive, 1e-3)
+    keep, state, output = math.exp(-1 / 20), 0.0, []
+    for u, ahead in zip(drive - drive[0], [*(drive[1:] - drive[0]), 0.0], strict=True):
+        output.append(state)
+        if hold == "zero-order":
+            state = keep * state + (1 - keep) * u
+        else:  # a straight line: its end, less what lags of its slope
+            slope = 20 * (ahead - u)
+            state = keep * (state - u + slope) + ahead - slope
+    plain = 3.0 * np.array(output)
+    between = late(plain[:, None], 4.5)[:, 0]
+    assert_allclose(found[20:280], between[20:280], atol=2e-4)
+    assert found.shape == (300,) and clamped == 0
+
+
+def record_of(samples=400, step_s=0.01, name="r"):
+    drive = 4.0 + np.sin(np.arange(samples) / 9.0) * np.linspace(0.5, 2.0, samples)
+    return SiRecord(name, "", drive, 1e-4 * drive**2 + 1e-6 * np.arange(samples), step_s, samples // 20)
+
+
+def test_what_a_record_may_add_is_an_offset_its_memory_and_the_tail_of_all_lags():
+    record = record_of()
+    found = joint._nuisance(record.drive_v, 0.01, (0.1, 2.0), 300)
+    time = 0.01 * np.arange(400)
+    assert_allclose(found[:, 0], 1.0)
+    assert_allclose(found[:, 1:9], memory(record.drive_v, 300))
+    assert_allclose(found[:, 9], np.exp(-time / 0.1) + np.exp(-time / 2.0))
+    assert joint._nuisance(record.drive_v, 0.01, (), 400).shape == (400, 9)
+    assert_allclose(made_of(creep=Creep((1.0, 1.0), (0.1, 2.0))).nuisance(record.drive_v, 0.01, 300), found)
+
+
+def test_a_record_of_a_fit_is_about_its_first_drive_value_and_counts_by_its_used_output():
+    record = record_of()
+    run = joint._fit_record(record, (0.5,))
+    assert (run.name, run.step_s, run.stride, run.first, run.hold, run.late_s) == ("r", 0.01, 1, 20, "first-order", 0.0)
+    assert_allclose(run.drive[:, 0], record.drive_v - record.drive_v[0])
+    assert_allclose(run.output[:, 0], record.output_rad)
+    used = record.output_rad[20:]
+    assert run.weight == pytest.approx(1 / (np.std(used) * math.sqrt(380)))
+    columns = joint._nuisance(record.drive_v, 0.01, (0.5,), 400)[20:]
+    own = columns @ np.linalg.lstsq(columns, used, rcond=None)[0]
+    assert_allclose(run.target[:, 0], used - own, atol=1e-9 * np.ptp(used))
+    held = joint._between(run, "zero-order", 0.01)
+    assert (held.hold, held.late_s) == ("zero-order", 0.0)
+    thinned = joint._between(run, "zero-order", 0.0025)
+    assert (thinned.hold, thinned.late_s) == ("first-order", 0.00125)
+    straight = joint._between(run, "first-order", 0.0025)
+    assert (straight.hold, straight.late_s) == ("first-order", 0.0)
+
+
+def test_records_are_weighed_by_what_is_left_of_each_where_the_search_begins():
+    """Plays of one weight leave the squares of what two outputs have beyond it: of both the sum becomes 1 together."""
+    structure = one_axis("plays", PrandtlIshlinskii((0.0,), (2e-4,)))
+    runs = [joint._fit_record(record_of(n, step, name), ()) for n, step, name in ((400, 0.01, "a"), (260, 0.02, "b"))]
+    runs[1] = replace(runs[1], output=3.0 * runs[1].output)
+    weighed = joint._weighed(structure, runs)
+    total = 0.0
+    for before, after in zip(runs, weighed, strict=True):
+        modelled = 2e-4 * before.drive[before.first :, 0]
+        left = modelled - before.output[before.first :, 0]
+        left = left - before.nuisance @ (before.nuisance.T @ left)
+        assert after.weight == pytest.approx(1 / (np.sqrt(np.mean(left**2)) * math.sqrt(380 + 247)), rel=1e-6)
+        assert (after.name, after.first, after.step_s) == (before.name, before.first, before.step_s)
+        total += np.sum((after.weight * left) ** 2)
+    assert total == pytest.approx(1.0)
+
+
+def test_starts_are_scattered_in_epsilon_and_alpha_alone_and_by_their_seed():
+    parameters = [SimpleNamespace(name=name, start=start) for name, start in NAMED_STARTS]
+    one = joint._scattered_starts(SimpleNamespace(parameters=parameters), 4, 11)
+    assert len(one) == 3
+    rng = np.random.Generator(np.random.Philox(11))
+    for found in one:
+        moved = rng.standard_normal(5)
+        assert_allclose(
+            found,
+            [3.0, -2.0 * np.exp(0.3 * moved[1]), 0.5 * np.exp(0.3 * moved[2]), 0.25, 0.7 * np.exp(0.3 * moved[4])],
+        )
+    assert joint._scattered_starts(SimpleNamespace(parameters=parameters), 1, 11) == []
+
+
+NAMED_STARTS = (
+    ("d1", 3.0),
+    ("epsilon", -2.0),
+    ("alpha", 0.5),
+    ("beta over alpha", 0.25),
+    ("epsilon over its limit", 0.7),
+)
+
+
+def test_plays_begin_at_their_least_squares_with_creep_and_the_sign_of_the_output():
+    """Of two records one is three times as large; both count alike, and all weights have one sign."""
+    records = [record_of(400, 0.01, "a"), replace(record_of(300, 0.01, "b"), start=15)]
+    thresholds = threshold_grid(max(np.ptp(r.drive_v) for r in records), 15)
+    given = []
+    for record, size in zip(records, (1.0, 3.0), strict=True):
+        drive = record.drive_v - record.drive_v[0]
+        plays_of = kernels.play_response(drive, thresholds, np.zeros(15))
+        lag = kernels.lag_response(drive, 0.01, np.array([0.5]), np.zeros(1))
+        output = -size * (plays_of[:, 0] * 5e-5 + plays_of[:, 4] * 2e-5 + lag[:, 0] * 1e-5)
+        given.append(replace(record, output_rad=output if size == 1.0 else output / 3.0))
+    runs = [joint._fit_record(record, (0.5,)) for record in given]
+    model, creep = joint._play_start(FORMS["prandtl_ishlinskii_creep"], tuple(given), runs, None, (0.5,))
+    expected = np.zeros(15)
+    expected[[0, 4]] = -5e-5, -2e-5
+    assert_allclose(model.weights_rad_v, expected, atol=2e-9)
+    assert creep == (pytest.approx(-1e-5, rel=1e-3),) and model.widening_s == 0.0
+    assert_allclose(model.thresholds_v, thresholds)
+    line, none = joint._play_start(FORMS["linear"], tuple(given), runs, None, ())
+    assert line.thresholds_v == (0.0,) and len(line.weights_rad_v) == 1 and none == ()
+
+
+@pytest.mark.parametrize(
+    ("samples", "most", "bent", "kept"),
+    [
+        (1000, 1000, 1.0, 1000),
+        (1001, 500, 1.0, 334),
+        (1000, 250, 1.0, 250),
+        (1000, 250, 0.0, 1000),
+        (999, 300, 0.01, 500),
+    ],
+)
+def test_a_record_is_thinned_by_halves_until_straight_lines_make_its_drive(samples, most, bent, kept):
+    drive = np.sin(2 * np.pi * np.arange(samples) / 40.0)
+    record = SiRecord("r", "", drive, drive, 0.01, 50)
+    found = thin_record(record, most, bent)
+    assert found.drive_v.size == kept
+    assert found.step_s == pytest.approx(0.01 * math.ceil(samples / kept))

@@ -526,6 +526,9 @@ def test_the_noise_of_a_line_is_the_mean_of_its_neighbours_and_what_no_model_exp
     squares = np.sum(problem.residual(AT)[:80].reshape(2, 40) ** 2, axis=0) / 2
     assert_allclose(less.root_weight, problem.root_weight / np.sqrt(np.maximum(near(squares, 2.0), 1.0)), rtol=1e-9)
     assert_allclose(less.residual(AT) @ less.columns(AT), np.zeros(4), atol=1e-7)
+    weighted = less.root_weight * response.response[:, 0, 0]
+    target = np.concatenate([weighted.real, weighted.imag, [0.0, 0.0]])
+    assert_allclose(less.linear(AT), np.linalg.lstsq(less.columns(AT), target, rcond=None)[0], rtol=1e-8)
     assert_allclose(problem.root_weight, problem_of()[0].root_weight)  # the first one stays
 
 
