@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.optimize
+from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
@@ -28,11 +29,22 @@ from microrad.lab.identify import (
     predict,
     statistics,
 )
+from microrad.lab.identify.hysteresis import bouc_wen as bouc_wen_of
+from microrad.lab.identify.hysteresis import prandtl_ishlinskii as prandtl_of
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, _bound_gradient, _not_identified
 from microrad.lab.identify.hysteresis.plant_fit import _not_identified as _not_identified_jointly
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.mirror_file import _names
-from microrad.lab.identify.records import fastest_rate, lead, memory, si_records, transient, turning_points
+from microrad.lab.identify.records import (
+    SiRecord,
+    centred,
+    fastest_rate,
+    lead,
+    memory,
+    si_records,
+    transient,
+    turning_points,
+)
 from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.selection.warnings import _FLIPPED
@@ -1121,3 +1133,221 @@ def test_a_mirror_file_of_eq_3_that_falls_has_its_signs_and_their_errors_turned(
     np.testing.assert_allclose(rows[0], [-0.5], atol=1e-3)
     np.testing.assert_allclose(rows[1], [-0.25, 0.0], atol=1e-3)
     np.testing.assert_allclose(rows[4], [0.0, 0.0, 0.0, 0.0, -0.75], atol=1e-3)
+
+
+# ------------------------------------------------------------------------------------------ Eq. 3 and plays, by hand
+def told_of(function, *given, **words):
+    with pytest.raises(IdentificationError) as caught:
+        function(*given, **words)
+    return str(caught.value)
+
+
+def problem_of(share=math.inf, rate_limit=250.0):
+    """Two records of unlike length, step and range."""
+    drives = [5.0 + 2.0 * np.sin(np.arange(300) / 15.0), 4.0 + 3.0 * np.sin(np.arange(200) / 10.0)]
+    outputs = [1e-4 * drives[0] ** 2, 2e-4 * drives[1]]
+    records = [
+        SiRecord(name, "", drive, output, step, start)
+        for name, drive, output, step, start in zip("ab", drives, outputs, (0.01, 0.002), (15, 10), strict=True)
+    ]
+    return bouc_wen_of.BoucWenProblem(tuple(records), share, rate_limit)
+
+
+THETA = np.array([0.25, -2.0, math.log(3.0), math.log(0.5)])
+
+
+def test_searched_numbers_are_counted_in_the_rate_and_the_range_of_the_drives():
+    problem = problem_of()
+    span_v = np.ptp(problem.records[1].drive_v)
+    assert problem.drive_span_v == span_v and problem.output_span_rad == np.ptp(problem.records[0].output_rad)
+    assert problem.physical(THETA) == pytest.approx((0.001, -0.008, 3.0 / span_v, 0.5 / span_v))
+    assert problem.bound(THETA) == math.inf and problem_of(0.7).bound(THETA) == pytest.approx(0.7 * 3.0 / 3.5)
+    assert problem.scale == pytest.approx(1 / (problem.output_span_rad * math.sqrt(285 + 190)))
+    own = fastest_rate(problem.records)
+    assert bouc_wen_of.BoucWenProblem(problem.records, 0.5).rate_limit == own
+
+
+@pytest.mark.parametrize("share", [math.inf, 0.02])
+def test_the_best_of_d1_and_epsilon_lies_on_the_bound_where_it_would_take_back_more(share):
+    problem = problem_of(share)
+    columns = problem.columns(THETA)
+    if share < math.inf:
+        problem.target = columns @ [1e-4, -5e-5] + centred(1e-6 * philox(1).standard_normal(475), problem.records)
+    d1, epsilon = problem.linear(columns, THETA)
+    free = np.linalg.lstsq(columns, problem.target, rcond=None)[0]
+    if share == math.inf:
+        assert_allclose((d1, epsilon), free, rtol=1e-6)
+        expected = problem.target - columns @ free
+    else:
+        bound = share * 3.0 / 3.5
+        assert free[1] / free[0] < -bound
+        joint = columns[:, 0] - bound * columns[:, 1]
+        expected = problem.target - joint * (joint @ problem.target) / (joint @ joint)
+        assert epsilon == pytest.approx(-bound * d1)
+    assert_allclose(problem.residual(THETA), expected * problem.scale, atol=1e-9)
+    values = problem.solve(THETA)
+    _, _, settled, reversal = problem.physical(THETA)
+    assert_allclose(values[:5], [d1, 0.001, epsilon, -0.008, (settled + reversal) / 2])
+    assert values[5] == pytest.approx(math.copysign((settled - reversal) / 2, epsilon * (settled - reversal)))
+    assert bouc_wen_of.k_settled(values) == pytest.approx(settled)
+    by_row = bouc_wen_of.stacked_output(problem, values)
+    own = [r.drive_v.size - r.start for r in problem.records]
+    assert by_row.size == sum(own)
+    assert_allclose(centred(by_row, problem.records), columns @ (d1, epsilon), atol=1e-12)
+
+
+def test_the_lowest_slope_is_that_of_all_records_at_a_limited_rate_in_the_direction_of_d1():
+    problem = problem_of()
+    values = np.array([-8e-5, 3e-3, 6e-5, 4e-3, 2.0, 1.0])
+    lowest = math.inf
+    for record in problem.records:
+        h = bouc_wen_response(record.drive_v, record.step_s, np.array([*values, 250.0, 0.0]), 0.0)[1]
+        for k in range(record.start, record.drive_v.size - 1):
+            rate = (record.drive_v[k + 1] - record.drive_v[k]) / record.step_s
+            near = min(max(rate, -250.0), 250.0)
+            slope = -8e-5 * math.exp(-3e-3 * near) + 6e-5 * math.exp(4e-3 * abs(near))
+            slope -= 1.0 * abs(h[k]) + 2.0 * math.copysign(1.0, rate) * h[k]
+            lowest = min(lowest, -slope)
+    assert bouc_wen_of.lowest_slope(problem, values) == pytest.approx(lowest, rel=1e-9)
+    slow = bouc_wen_of.BoucWenProblem(problem.records, math.inf, 20.0)
+    assert bouc_wen_of.lowest_slope(slow, values) != pytest.approx(lowest, rel=1e-3)
+
+
+def test_starts_are_the_best_of_the_grid_in_turn_and_scattered_about_them():
+    problem = problem_of()
+    starts = bouc_wen_of._starts(problem, 6, 3)
+    costs = {}
+    for delta in (0.0, 1.0, 2.0, 4.0):
+        for settled in (2.0, 8.0, 30.0, 120.0):
+            for ratio in (0.3, 1.0, 4.0, 20.0):
+                theta = (0.0, delta, math.log(settled), math.log(settled * ratio))
+                costs[theta] = float(np.sum(problem.residual(np.array(theta)) ** 2))
+    best = sorted(costs, key=costs.get)[:4]
+    scatter = 0.4 * np.random.Generator(np.random.Philox(3)).standard_normal((6, 4))
+    for k, start in enumerate(starts):
+        centre, moved = np.array(best[k % 4]), scatter[k] * (k > 0)
+        expected = centre + moved * [0.1, 1.0, 1.0, 1.0]
+        expected[1] = max(centre[1], 0.2) * math.exp(moved[1])
+        assert_allclose(start, np.clip(expected, bouc_wen_of._LOWER + 1e-6, bouc_wen_of._UPPER - 1e-6))
+
+
+def test_the_settled_hysteresis_of_a_fit_has_the_error_of_its_parts():
+    sizes = np.array([1e-6, 1e-7, 2e-6, 1e-4, 0.5, 0.25])
+    between = np.eye(6)
+    between[2, 4] = between[4, 2] = 0.4
+    between[4, 5] = between[5, 4] = -0.6
+    covariance = sizes[:, None] * between * sizes
+    for epsilon, settled in ((4e-5, 40.0 + 30.0), (-4e-5, 40.0 - 30.0)):
+        fit = object.__new__(BoucWenFit)
+        vars(fit).update(model=BoucWen(8e-5, 3e-7, epsilon, 5e-4, 40.0, 30.0, 777.0), covariance=covariance)
+        value, error = fit.settled_hysteresis_rad
+        assert value == pytest.approx(4e-5 / settled)
+        found = statistics.propagated(
+            lambda v: np.array([abs(v[2]) / (v[4] + math.copysign(v[5], v[2]))]), fit.values, covariance
+        )
+        assert error == pytest.approx(found[0], rel=1e-6)
+        assert fit.rate_limit_v_per_s == 777.0 and fit.falling is False
+        drive = 2.0 + np.sin(np.arange(50) / 3.0)
+        output, clamped = fit.response(drive, 1e-3)
+        expected, _, count = bouc_wen_response(drive, 1e-3, np.array([*fit.values, 777.0, 0.0]), 0.0)
+        assert_allclose(output, expected)
+        assert clamped == count
+    assert [vars(fit).update(constrained=c) or fit.name for c in (True, False)] == ["bouc_wen_admissible", "bouc_wen"]
+
+
+def test_sizes_of_parameters_are_their_own_or_what_matters_at_the_fastest_rate():
+    problem = problem_of()
+    values = np.array([-8e-5, 0.0, 1e-20, -1e-9, 2.0, 1e-5])
+    assert_allclose(bouc_wen_of._sizes(problem, values), [8e-5, 4e-6, 8e-14, 4e-5, 2.0, 2e-3])
+    assert_allclose(bouc_wen_of._sizes(problem, 10.0 * np.ones(6)), 10.0)
+
+
+def test_on_a_bound_the_covariance_is_that_along_it():
+    """Across the bound nothing moves, and along it what the slopes say."""
+    draw = philox(6)
+    values, sizes = np.array([8e-5, 1e-4, -4e-5, 1e-3, 3.0, 1.0]), np.array([1e-5, 1e-4, 1e-5, 1e-3, 1.0, 1.0])
+    jacobian = draw.standard_normal((200, 6)) / sizes
+    free = bouc_wen_of._covariance(jacobian, sizes, 0.04, None)
+    assert_allclose(free, 0.04 * np.linalg.inv(jacobian.T @ jacobian), rtol=1e-8)
+    bounded = bouc_wen_of._covariance(jacobian, sizes, 0.04, values)
+    normal = _bound_gradient(values) * sizes
+    basis = np.linalg.svd(normal[None])[2][1:].T
+    own = jacobian * sizes @ basis
+    expected = sizes[:, None] * (basis @ (0.04 * np.linalg.inv(own.T @ own)) @ basis.T) * sizes
+    assert_allclose(bounded, expected, rtol=1e-7, atol=1e-12 * np.abs(expected).max())
+    assert abs(normal / sizes @ bounded @ (normal / sizes)) < 1e-12 * abs(normal / sizes @ free @ (normal / sizes))
+
+
+def test_thresholds_that_cannot_be_used_are_told_in_full():
+    records = si_records([play_record([1.0], [0.0])], Units())
+    half = np.ptp(records[0].drive_v) / 2
+    for given in ([0.0, 1.0, 1.0], [0.5, 1.0], [0.0, math.nan], [0.0, half]):
+        assert told_of(prandtl_of._thresholds, records, given, 3) == (
+            f"the thresholds {np.array(given).tolist()} V cannot be used; they must start at 0, increase strictly "
+            f"and stay below half of the drive's peak-to-peak, {half:g} V, or an operator never moves both ways."
+        )
+    assert told_of(prandtl_of._thresholds, records, None, -2) == (
+        "-2 play operators were asked for; give at least 1, better 10 or more."
+    )
+    assert_allclose(prandtl_of._thresholds(records, None, 4), 0.94 * half * np.arange(4) / 3)
+    assert prandtl_of._thresholds(records, 0, 9).tolist() == [0.0]
+
+
+def test_a_fit_of_plays_that_falls_has_the_sign_in_its_model_and_its_response():
+    drive = 3.0 + np.sin(np.arange(90) / 4.0)
+    fit = PrandtlIshlinskiiFit(
+        np.array([0.0, 0.25, 0.5]), np.array([2.0, 0.0, 0.75]), np.zeros(3), -1, (), 12.5, Units(), 1.0, 1.0, 1.0, 9
+    )
+    states = play_response(drive, np.array([0.0, 0.5]), np.full(2, drive[0]))
+    output, clamped = fit.response(drive, 1.0)
+    assert_allclose(output, -2.0 * states[:, 0] - 0.75 * states[:, 1])
+    assert (clamped, fit.parameter_count, fit.falling, fit.name) == (0, 2, True, "prandtl_ishlinskii")
+    assert fit.model.weights_rad_v == (-2.0, 0.0, -0.75) and fit.model.thresholds_v == (0.0, 0.25, 0.5)
+    assert fit.model.rate_limit_v_s == 12.5 and fit.model.widening_s == 0.0
+
+
+def test_errors_of_weights_are_those_of_the_columns_in_use():
+    draw = philox(8)
+    states = draw.standard_normal((60, 4)) @ np.diag([1.0, 5.0, 2.0, 0.1])
+    errors, condition = prandtl_of._errors(states, np.array([1.0, 0.0, 3.0, 2.0]), 0.09)
+    own = states[:, [0, 2, 3]]
+    expected = np.sqrt(0.09 * np.diag(np.linalg.inv(own.T @ own)))
+    assert np.isnan(errors[1])
+    assert_allclose(errors[[0, 2, 3]], expected)
+    assert condition == pytest.approx(np.linalg.cond(own))
+    none, undefined = prandtl_of._errors(states, np.zeros(4), 0.09)
+    assert np.isnan(none).all() and math.isnan(undefined)
+
+
+def test_two_records_of_plays_have_offsets_of_their_own_and_count_by_their_samples():
+    """By least squares over both, each with an offset and a memory; every weight is in use."""
+    records = [play_record([5e-5, 2e-5], [0.0, 1.0], seed=k, noise=0.02) for k in (1, 2)]
+    records[1] = replace(records[1].first(2500), output=records[1].output[:2500] + 0.7, sha256="other")
+    fit = fit_prandtl_ishlinskii(records, [0.0, 1.0], units=Units("V", "rad"))
+    prepared = si_records(records, Units("V", "rad"))
+    blocks, target, plays_of = [], [], []
+    for k, r in enumerate(prepared):
+        states = play_response(r.drive_v, np.array([0.0, 1.0]), np.full(2, r.drive_v[0]))[r.start :]
+        own = np.column_stack([np.ones(r.drive_v.size), memory(r.drive_v, r.drive_v.size)])[r.start :]
+        wide = np.zeros((len(own), 18))
+        wide[:, 9 * k : 9 * k + 9] = own
+        blocks.append(np.hstack([states, wide]))
+        plays_of.append(states)
+        target.append(r.output_rad[r.start :])
+    matrix, output = np.vstack(blocks), np.concatenate(target)
+    solved = np.linalg.lstsq(matrix, output, rcond=None)[0]
+    assert_allclose(fit.weights_rad_per_v, solved[:2], rtol=1e-6)
+    assert_allclose(
+        fit.offsets_rad, [np.mean(t - s @ solved[:2]) for t, s in zip(target, plays_of, strict=True)], rtol=1e-5
+    )
+    left = output - matrix @ solved
+    assert fit.residual_rms_percent == pytest.approx(
+        100 * np.sqrt(np.mean(left**2)) / np.ptp(prepared[0].output_rad), rel=1e-3
+    )
+    parts = np.split(left, [prepared[0].used])
+    assert fit.colour_inflation == pytest.approx(colour_inflation(parts), rel=1e-3)
+    free = left.size - 2 - sum(r.own_count for r in prepared)
+    variance = fit.colour_inflation * left @ left / free
+    errors = np.sqrt(variance * np.diag(np.linalg.pinv(matrix.T @ matrix))[:2])
+    assert_allclose(fit.standard_errors_rad_per_v, errors, rtol=1e-3)
+    assert (fit.samples_used, fit.sign) == (3800 + 2375, 1)

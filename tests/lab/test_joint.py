@@ -723,6 +723,7 @@ def test_plays_begin_at_their_least_squares_with_creep_and_the_sign_of_the_outpu
         (1000, 250, 1.0, 250),
         (1000, 250, 0.0, 1000),
         (999, 300, 0.01, 500),
+        (1000, 150, 0.045, 334),
     ],
 )
 def test_a_record_is_thinned_by_halves_until_straight_lines_make_its_drive(samples, most, bent, kept):
