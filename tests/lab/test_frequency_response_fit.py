@@ -3,6 +3,7 @@
 import re
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import control as python_control
 import numpy as np
@@ -706,3 +707,199 @@ def test_the_rows_of_a_table_are_turned_back_by_the_delay_and_weighed_by_its_err
     np.testing.assert_allclose(own.response, OF_TWO * np.exp(2j * np.pi * FIVE * 0.02)[:, None, None])
     assert (own.hold, own.rate_hz, own.direct) == ("zero-order", 30.0, False)
     np.testing.assert_allclose(own.weight[:, :5], 2.0 / OF_TWO.real.reshape(5, 6).T ** 2)
+
+
+# ------------------------------------------------------------------------------------------ numbers unlike each other
+def test_what_errors_rest_on_and_what_speaks_against_a_model_is_told_in_full():
+    assert frequency_fit._errors_from(False, 3.0, 3.0) == (
+        "the residual: no standard errors were given, so the noise is taken to be what the model leaves"
+    )
+    assert frequency_fit._errors_from(True, 1.0, 0.98765) == (
+        "the standard errors given; chi-square per degree of freedom is 0.988"
+    )
+    assert frequency_fit._errors_from(True, 6.25, 6.25) == (
+        "the standard errors given, times 2.5 for what the model leaves beyond them"
+    )
+    assert frequency_fit._misfit(6.25) == (
+        "the model leaves 2.5 times the standard errors given: the order is too low, the response is not that of a "
+        "linear system, or the errors are too small; those of the model are larger by as much.",
+    )
+    assert frequency_fit._open_delay(0.00123, 40.0) == ()
+    assert frequency_fit._open_delay(0.00126, 40.0) == (
+        "the table does not fix the delay: its standard error is 0.0013 s, as poles and gains can take its part; fit "
+        "without a delay, or measure to higher frequencies.",
+    )
+    table = np.array([1.0, 2.0, 10.0, 20.0j])
+    assert frequency_fit._uneven(table, np.array([0.3, -0.1j, 1.2, 0.5])) == (
+        "the model leaves 4.11 times as much where the response is large: the noise is not alike, and an order chosen "
+        "from it is too high; give standard_error, such as 0.01 * abs(response).",
+    )
+    assert frequency_fit._uneven(table, np.array([0.3, -0.1j, 0.6, 0.7])) == ()
+    assert frequency_fit._uneven(table, 1e-11 * np.array([0.0, 0.0, 1.2, 0.5])) == ()
+    assert frequency_fit._uneven(np.ones(4), np.ones(4)) == ()
+
+
+def polished_of(cost, rows=100, power=1e6, model=None):
+    return SimpleNamespace(cost=cost, rows=rows, power=power, model=model)
+
+
+def found_of(*costs, **words):
+    """Fits of the orders 1, 2, ... that leave so much."""
+    return {n: frequency_fit._Found(None, polished_of(cost, **words), 0.0) for n, cost in enumerate(costs, 1)}
+
+
+def table_of(error=None, direct=True):
+    return response_table.ResponseTable(
+        np.arange(1.0, 6.0), np.ones((5, 2, 3)) + 0j, error, "band-limited", None, direct
+    )
+
+
+def test_the_variance_of_a_row_is_the_least_that_an_order_leaves_per_degree_of_freedom():
+    """Of 100 rows: orders of 2 by 3 elements have five numbers a state, six direct terms and a delay."""
+    table, fits = table_of(), found_of(880.0, 166.0, 156.0)
+    assert frequency_fit._variance(table, fits, delay=True) == pytest.approx(156.0 / 78)
+    assert frequency_fit._variance(table, fits, delay=False) == pytest.approx(156.0 / 79)
+    assert frequency_fit._variance(table_of(np.ones((5, 2, 3))), fits, delay=True) == 1.0
+    assert frequency_fit._variance(table, found_of(1e-30, 1e-40), delay=False) == pytest.approx(1e-22)
+    assert frequency_fit._variance(table, found_of(1e-30), delay=False) == pytest.approx(1e-30 / 89)
+    assert frequency_fit._variance(table, found_of(0.0), delay=False) == 1e-300
+    assert frequency_fit._variance(table, found_of(5.0, rows=7), delay=False) == 5.0
+
+
+@pytest.mark.parametrize(("costs", "ended"), [([9e3, 500.0] + [499.0] * 5, False), ([9e3, 500.0] + [499.0] * 6, True)])
+def test_a_scan_ends_where_six_orders_in_a_row_gain_nothing(monkeypatch, costs, ended):
+    monkeypatch.setattr(frequency_fit, "_residual", lambda table, found: np.array([3.0, 4.0j]))
+    fits = found_of(*costs)
+    assert frequency_fit._gains_nothing(table_of(), fits, True) is ended
+    scores = frequency_fit._scores(table_of(), fits, True)
+    variance = frequency_fit._variance(table_of(), fits, True)
+    assert [score.order for score in scores] == list(fits)
+    assert (scores[1].parameters, scores[1].freedom) == (17, 83)
+    assert scores[1].chi_square == pytest.approx(500.0 / variance)
+    assert scores[1].criterion == pytest.approx(500.0 / variance + 17 * np.log(100))
+    assert scores[1].output_error_rms == pytest.approx(np.sqrt(12.5))
+
+
+@pytest.mark.parametrize(("outputs", "inputs"), [(1, 1), (3, 1), (1, 2), (2, 3)])
+def test_a_vector_fit_has_one_mode_for_each_pole_of_the_largest_part_of_its_residue(outputs, inputs):
+    draw = np.random.Generator(np.random.Philox(4)).standard_normal((2, 3, outputs, inputs))
+    residues = draw[0] + 1j * draw[1]
+    residues[0] = residues[0].real
+    poles = np.array([-3.0 + 0j, -1 + 9j, -2 + 20j])
+    found = SimpleNamespace(
+        poles_rad_s=np.concatenate([poles, poles[1:].conj()]),
+        residues=np.concatenate([residues, residues[1:].conj()]),
+        direct=draw[0, 0],
+    )
+    model = frequency_fit._one_each(found)
+    assert model.poles_rad_s.tolist() == poles.tolist()
+    for k, residue in enumerate(residues):
+        left, size, right = np.linalg.svd(residue)
+        expected = size[0] * np.outer(left[:, 0], right[0])
+        np.testing.assert_allclose(np.outer(model.output_vectors[:, k], model.input_vectors[k]), expected, atol=1e-12)
+    assert not model.input_vectors[0].imag.any() and model.direct.tolist() == draw[0, 0].tolist()
+
+
+def test_the_delay_of_least_cost_is_sought_on_a_grid_and_then_between_its_neighbours():
+    """A cost of two valleys in two periods of 4 Hz: the lower one, between two places of the grid."""
+    asked = []
+
+    def fitted(delay_s):
+        asked.append(delay_s)
+        return polished_of(min((delay_s - 0.31) ** 2, (delay_s - 0.05) ** 2 + 0.01))
+
+    table = SimpleNamespace(band_hz=(1.0, 4.0), equations=lambda delay_s: delay_s)
+    found = frequency_fit._best_delay(table, fitted)
+    np.testing.assert_allclose(asked[:17], 0.03125 * np.arange(17))
+    assert all(0.28125 <= each <= 0.34375 for each in asked[17:]) and len(asked) > 17
+    assert found.delay_s == found.equations == pytest.approx(0.31, abs=1e-6)
+    at_once = frequency_fit._best_delay(table, polished_of)
+    assert at_once.delay_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "cost", "variance", "chi_square"),
+    [
+        (True, 88.0, 1.0, 1.0),
+        (True, 44.0, 1.0, 0.5),
+        (True, 88.0 * 1.44, 1.0, 1.44),
+        (True, 88.0 * 1.46, 1.46, 1.46),
+        (False, 44.0, 0.5, None),
+        (False, 0.0, 1e-300, None),
+    ],
+)
+def test_what_is_left_counts_as_noise_beyond_three_standard_deviations_of_chi_square(given, cost, variance, chi_square):
+    """Of 100 rows a state and a delay leave 88 degrees of freedom: 1.452."""
+    model = ModalModel(np.array([-3.0 + 0j]), np.ones((1, 3)) + 0j, np.ones((2, 1)) + 0j, np.zeros((2, 3)))
+    polished = SimpleNamespace(cost=cost, rows=100, power=1.0, model=model, normal="normal")
+    table = table_of(np.ones((5, 2, 3)) if given else None)
+    found = frequency_fit._Found(None, polished, 0.25)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(frequency_fit, "_with_delay", lambda found: "with delay")
+        result = frequency_fit._result(table, found, True, [1, 2], "because")
+    assert result.variance == pytest.approx(variance) and result.normal == "with delay"
+    assert result.chi_square == (None if chi_square is None else pytest.approx(chi_square))
+    assert (result.order, result.hold, result.scan, result.reason) == (1, "band-limited", (1, 2), "because")
+    assert result.delay_s == 0.25 and not result.strictly_proper and result.band_hz == (1.0, 5.0)
+    assert frequency_fit._result(table, found, False, (), "").normal == "normal"
+    expected = (
+        np.ones((5, 2, 3)) - model.response(table.freq_hz) * np.exp(-2j * np.pi * table.freq_hz * 0.25)[:, None, None]
+    )
+    np.testing.assert_allclose(result.residual, expected)
+    share = np.linalg.norm(expected) / np.sqrt(30)
+    assert (
+        repr(result)
+        == f"<FrequencyResponseFit of order 1: 2 x 3 elements at 5 frequencies, {share:.3g} of the table left>"
+    )
+
+
+def test_errors_of_gain_and_phase_and_of_poles_are_those_of_differences():
+    """Two outputs and one drive, a real pole, a pair and a delay; every number with an error of its own."""
+    draw = np.random.Generator(np.random.Philox(6))
+    poles = np.array([-60.0 + 0j, -20 + 30j])
+    model = ModalModel(
+        poles, np.array([[1.0], [1 + 2j]]), np.array([[30.0, 5 - 2j], [7.0, 1 + 4j]]), np.array([[0.5], [1.0]]), 0.01
+    )
+    numbers = pack(model, True)
+    root = (
+        1e-3
+        * draw.standard_normal((numbers.size + 4, numbers.size + 1))
+        * np.append(np.maximum(np.abs(numbers), 1.0), 0.1)
+    )
+    freq = np.array([0.5, 4.0, 9.0])
+    fit = frequency_fit.FrequencyResponseFit(
+        model.state_space(),
+        model,
+        3,
+        "band-limited",
+        None,
+        freq,
+        model.response(freq),
+        (),
+        "",
+        None,
+        2.0,
+        "",
+        None,
+        False,
+    )
+    covariance = root.T @ root
+    vars(fit)["covariance"] = covariance
+    gain, phase = fit.response_errors([3.0, 6.0])
+
+    def quantities(v):
+        own = replace(unpack(v[:-1], model), delay_s=float(v[-1])).response(np.array([3.0, 6.0])).ravel()
+        return np.concatenate([np.abs(own), np.unwrap(np.angle(own / fit.response([3.0, 6.0]).ravel()))])
+
+    at = np.append(numbers, 0.01)
+    jacobian = central_differences(quantities, at, 1e-6 * np.maximum(np.abs(at), 0.01))
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
+    np.testing.assert_allclose(gain.ravel(), errors[:4], rtol=1e-4)
+    np.testing.assert_allclose(phase.ravel(), errors[4:], rtol=1e-4)
+    size = np.sqrt(np.diag(covariance))
+    slow, fast = fit.natural
+    assert slow.freq_hz == pytest.approx(np.hypot(20, 30) / (2 * np.pi)) and fast.damping == 1.0
+    assert fast.freq_error_hz == pytest.approx(size[0] / (2 * np.pi))
+    assert slow.freq_error_hz == pytest.approx(np.hypot(20 * size[1], 30 * size[2]) / np.hypot(20, 30) / (2 * np.pi))
+    assert fit.known.delay_error_s == pytest.approx(size[-1])
+    assert fit.poles_rad_s.tolist() == [-60, -20 + 30j, -20 - 30j] and fit.zeros_rad_s.size == 0

@@ -20,11 +20,12 @@ from microrad.lab.identify.linear.fit import (
     output_error,
     range_warnings,
 )
-from microrad.lab.identify.linear.modal import ModalModel, order_modes, simulate, simulate_periodic
+from microrad.lab.identify.linear.modal import ModalModel, hold_step, order_modes, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order, reduced
 from microrad.lab.identify.linear.polish import (
     FrequencyEquations,
     TimeEquations,
+    fit_outputs,
     normal_equations,
     pack,
     polish,
@@ -797,3 +798,106 @@ def test_errors_of_poles_and_gains_are_those_of_differences(drop):
     np.testing.assert_allclose(
         np.concatenate([known.dc_gain.ravel(), known.edge_gain.ravel()]), quantities(numbers)[2 * n :]
     )
+
+
+def test_equations_in_time_are_what_is_simulated_of_each_record_behind_its_first_samples():
+    """Two records of unlike length and rate, two drives and two outputs, a real pole and a pair."""
+    draw = philox(12)
+    poles = np.array([-50.0 + 0j, -20 + 300j])
+    b, c = draw.standard_normal((2, 2, 2)), draw.standard_normal((2, 2, 2))
+    b, c = b[0] + 1j * b[1], c[0] + 1j * c[1]
+    b[0], c[:, 0] = b[0].real, c[:, 0].real
+    model = ModalModel(poles, b, c, draw.standard_normal((2, 2)))
+    records = [
+        recording(draw.standard_normal((n, 2)) + 4.0, draw.standard_normal((n, 2)) - 3.0, rate)
+        for n, rate in ((60, 500.0), (90, 700.0))
+    ]
+    equations = TimeEquations(records, "first-order", 7)
+    cost = power = 0.0
+    for record in records:
+        modelled = simulate(model, record.drive - record.drive[0], record.rate_hz, "first-order")[7:]
+        output = record.output[7:] - record.output[7:].mean(axis=0)
+        cost += np.sum((output - (modelled - modelled.mean(axis=0))) ** 2)
+        power += np.sum(output**2)
+    _, gradient, found = normal_equations(equations, model)
+    assert found == pytest.approx(cost) and equations.power == pytest.approx(power)
+    assert equations.rows == 2 * (53 + 83) and equations.decay_rad_s == pytest.approx(0.02 * np.pi * 700.0 / 83)
+    best, left = fit_outputs(equations, poles, b)
+    assert normal_equations(equations, best)[2] == pytest.approx(left, rel=1e-9) and left < cost
+    proper, more = fit_outputs(TimeEquations(records, "first-order", 7, direct=False), poles, b)
+    assert more > left and not proper.direct.any()
+    assert np.abs(normal_equations(equations, best)[1][2 * 3 + 3 * 2 - 3 :]).max() < 1e-7 * np.abs(gradient).max()
+
+
+def test_equations_in_frequency_weigh_the_error_by_the_power_of_both_drives():
+    draw = philox(13)
+    freq = np.array([3.0, 7.0, 11.0, 40.0])
+    model = ModalModel(
+        np.array([-90.0 + 0j]), np.array([[1.0, -2.0]]) + 0j, np.array([[5.0], [8.0]]) + 0j, np.ones((2, 2))
+    )
+    error = draw.standard_normal((4, 2, 2)) + 1j * draw.standard_normal((4, 2, 2))
+    power = np.array([[2.0, 0.5j], [-0.5j, 3.0]]) * np.array([1.0, 2.0, 4.0, 8.0])[:, None, None]
+    values = model.response(freq, "zero-order", 100.0) + error
+    equations = FrequencyEquations(freq, values, power, "zero-order", 100.0)
+    cost = sum(np.trace(e @ p @ e.conj().T).real for e, p in zip(error, power, strict=True))
+    assert normal_equations(equations, model)[2] == pytest.approx(cost)
+    whole = sum(np.trace(v @ p @ v.conj().T).real for v, p in zip(values, power, strict=True))
+    assert equations.power == pytest.approx(whole) and equations.rows == 32
+    assert equations.decay_rad_s == pytest.approx(2 * np.pi * 0.03)
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_a_step_of_several_modes_is_exact_for_both_holds(size):
+    """A drive that is held, and one that rises in a straight line over the step."""
+    poles = np.array([-30.0 + 0j, -5 + 80j, -1e-9 + 0j])[:size]
+    period = 0.02
+    x, weights = np.polynomial.legendre.leggauss(30)
+    t, weights = period * (x + 1) / 2, weights * period / 2
+    held, straight = hold_step(poles, "zero-order", 50.0), hold_step(poles, "first-order", 50.0)
+    for k, pole in enumerate(poles):
+        grown = np.exp(pole * (period - t))
+        np.testing.assert_allclose(held.keep[k], np.exp(pole * period))
+        np.testing.assert_allclose(held.begin[k], weights @ grown, rtol=1e-9)
+        np.testing.assert_allclose(straight.end[k], weights @ (grown * t / period), rtol=1e-9)
+        np.testing.assert_allclose(straight.begin[k], weights @ (grown * (1 - t / period)), rtol=1e-9)
+        np.testing.assert_allclose(held.keep_rate[k], period * np.exp(pole * period))
+        np.testing.assert_allclose(straight.end_rate[k], weights @ (grown * (period - t) * t / period), rtol=1e-8)
+        np.testing.assert_allclose(held.begin_rate[k], weights @ (grown * (period - t)), rtol=1e-8)
+    assert not held.end.any() and not held.end_rate.any()
+    with pytest.raises(IdentificationError) as caught:
+        hold_step(poles, "band-limited", 50.0)
+    assert str(caught.value) == (
+        "a band-limited drive cannot be stepped from sample to sample; choose the zero-order hold (a converter holds "
+        "each value) or the first-order hold (straight lines between the samples)."
+    )
+
+
+def test_lines_of_two_drives_are_merged_by_their_cross_powers_with_what_is_over_at_the_end():
+    """1801 lines in pairs, and one that is left over."""
+    draw, freq = philox(14), np.arange(1.0, 1802.0)
+    root = draw.standard_normal((1801, 2, 2)) + 1j * draw.standard_normal((1801, 2, 2))
+    power = root @ root.conj().transpose(0, 2, 1) + 0.1 * np.eye(2)
+    values = draw.standard_normal((1801, 3, 2)) + 1j * draw.standard_normal((1801, 3, 2))
+    found = order._merged(SimpleNamespace(freq_hz=freq, response=values, drive_power=power))
+    assert [len(each) for each in found] == [901] * 3
+    for k in (0, 450, 900):
+        part = slice(2 * k, 2 * k + 2)
+        total = power[part].sum(axis=0)
+        np.testing.assert_allclose(found[0][k], freq[part].mean())
+        np.testing.assert_allclose(found[1][k], np.sum(values[part] @ power[part], axis=0) @ np.linalg.inv(total))
+        np.testing.assert_allclose(found[2][k], total)
+
+
+def test_the_modes_that_are_missed_least_are_a_pair_or_two_real_poles():
+    """Of two pairs and two real poles the weak pair costs least, and the real poles come next."""
+    freq = np.geomspace(1.0, 100.0, 60)
+    poles = np.array([-9.0, -200.0, -4 + 60j, -10 + 300j], dtype=complex)
+    c = np.array([[0.3, 2.0, 0.01, 20.0]]) + 0j
+    model = ModalModel(poles, np.ones((4, 1)) + 0j, c, np.zeros((1, 1)))
+    power = np.ones((60, 1, 1)) + 0j
+    equations = FrequencyEquations(freq, model.response(freq), power, "band-limited", None)
+    first, second = order._without_weakest(equations, model)
+    assert first[0].tolist() == poles[[0, 1, 3]].tolist() and first[1].shape == (3, 1)
+    assert second[0].tolist() == poles[2:].tolist()
+    alone = ModalModel(poles[2:3], np.ones((1, 1)) + 0j, c[:, 2:3], np.zeros((1, 1)))
+    assert order._without_weakest(equations, alone) == []
