@@ -1184,3 +1184,89 @@ def test_a_mirror_file_of_angles_that_was_not_stopped_says_so_for_each_amplitude
         "Not fitted: a, no a",
         "Not fitted: b, no b",
     ]
+
+
+def test_a_model_is_judged_kept_and_told_or_refused_under_its_own_name():
+    """The next of two that are left: its fields go from the fit, the records and the response into the candidate."""
+    told, heard = [], []
+    actuators = tuple(coupled.Actuator(f"u{k}", 0.0, -5.0, 5.0, 1e9) for k in range(2))
+    held = drawn_at_random("r", 64)
+    records = SimpleNamespace(
+        actuators=actuators,
+        outputs=(Output("x", "angle"), Output("y", "angle")),
+        rate_hz=250.0,
+        held_out=[held],
+        held_class=np.array([1]),
+        amplitudes_v=np.array([0.5, 1.0]),
+    )
+    one = of_models(
+        records=records,
+        response=SimpleNamespace(excited_hz=(3.0, 90.0)),
+        bands_hz=np.array([3.0, 20.0, 90.0]),
+        on_model=heard.append,
+        left=["first", "second", "third"],
+        total=3,
+    )
+    one.on_progress = lambda *args: told.append(args)
+    poles = np.array([-40.0 + 0j])
+    plant = linear.side_by_side([ModalModel(poles, np.ones((1, 2)) + 0j, np.ones((2, 1)) + 0j, np.zeros((2, 2)))])
+    fitted = linear.Fitted(
+        "own name", "per axis", 1, 17, plant, 2e-3, poles, np.array([0.5 + 0j]), 3e-5, None, note="of note"
+    )
+    one._judge(lambda: fitted)
+    (candidate,) = one.candidates
+    assert heard == [candidate] and one.fits == {"first": fitted} and one.left == ["second", "third"]
+    kept = ("name", "kind", "order", "parameters", "poles_rad_s", "poles_error_rad_s", "delay_error_s", "note")
+    assert all(getattr(candidate, field) is getattr(fitted, field) for field in kept)
+    model = candidate.model
+    assert (model.mirror, model.actuators, model.outputs) == (plant, actuators, records.outputs)
+    assert (model.delay_s, model.rate_hz, model.steps_per_sample) == (2e-3, 250.0, 2)
+    assert model.excited_hz == (3.0, 90.0) and model.known is None
+    judged = held_out_module.judge(model, records, one.bands_hz)
+    np.testing.assert_allclose(candidate.error_rms, judged.error_rms)
+    np.testing.assert_allclose(candidate.band_error_rms, judged.band_error_rms)
+    np.testing.assert_allclose(candidate.record_share, judged.record_share)
+    assert candidate.error_share == judged.share and np.isnan(candidate.error_rms[0]).all()
+
+    def refused():
+        raise IdentificationError("it cannot be.")
+
+    one._judge(refused)
+    assert (one.refused, one.done) == ([ladder.Refused("second", "it cannot be.")], 2) and one.left == ["third"]
+    one._judge(lambda: replace(fitted, name="runs", mirror=replace(plant, A=-900.0 * plant.A)))
+    assert one.refused[1:] == [ladder.Refused("runs", "it runs away on a held-out record")]
+    assert [what.split(";")[0] for *_, what in told] == ["first", "second", "third"] and len(heard) == 1
+    assert [args[:2] for args in told] == [(0, 3), (1, 3), (2, 3)]
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_result_has_what_each_amplitude_shows_and_what_the_chosen_model_makes_of_it(monkeypatch, stopped):
+    """Of three amplitudes the middle one has no response of its own."""
+
+    def responded(records, periodic):
+        if records[0].path == "b":
+            raise IdentificationError("too few")
+        names = [r.path for r in records]
+        return SimpleNamespace(response=("response", *names, float(records[0].output[0, 0]), periodic))
+
+    monkeypatch.setattr(ladder, "_response", responded)
+    monkeypatch.setattr(ladder, "modelled_output", lambda model, record: np.full((64, 2), model))
+    monkeypatch.setattr(ladder._Ladder, "_dependence", lambda self, responses: len(responses))
+    fitted = tuple(drawn_at_random(name, 64, seed=k) for k, name in enumerate("abcd"))
+    held = tuple(drawn_at_random(name, 64, seed=9 + k) for k, name in enumerate("vw"))
+    records = channels_module.Channels(
+        fitted, held, np.array([1.0, 2.0, 4.0]), np.array([0, 1, 2, 2]), np.array([0, 2]), (), (), True
+    )
+    models = [(SimpleNamespace(**vars(own), model=float(k)), judged) for k, (own, judged) in enumerate(THREE)]
+    one = of_models(*models, records=records, refused=[ladder.Refused("other", "why")])
+    found = one.result(stopped)
+    assert (found.chosen, found.within_noise, found.best.name) == ("best", ("best",), "best")
+    assert [own.name for own in found.candidates] == ["large", "best", "small"]
+    assert found.responses[0].response == ("response", "a", fitted[0].output[0, 0], True)
+    assert found.responses[1] is None and found.responses[2].response[:3] == ("response", "c", "d")
+    assert found.modelled == (("response", "a", 1.0, True), None, ("response", "c", "d", 1.0, True))
+    assert found.dependence == (None if stopped else 3) and found.stopped is stopped
+    assert (found.fitted, found.held_out) == (("a", "b", "c", "d"), ("v", "w"))
+    assert found.refused == (ladder.Refused("other", "why"),) and found.bands_hz is one.bands_hz
+    np.testing.assert_allclose(found.output_rms[[0, 2]], [r.output.std(axis=0) for r in held])
+    assert np.isnan(found.output_rms[1]).all() and np.isnan(found.noise_rms).all()
