@@ -1082,13 +1082,13 @@ def test_the_response_of_one_pair_is_without_the_delay_and_of_its_own_drive():
 
 
 def test_models_placed_among_other_channels_stand_side_by_side():
-    poles, direct = np.array([-3.0 + 0j, -2.0 + 7j]), np.array([[0.25]])
+    poles, direct = np.array([-3.0 + 0j, -2.0 + 7j]), np.array([[-0.25]])
     one = ModalModel(poles, np.array([[1.5], [1 + 2j]]), np.array([[4.0, 3 - 5j]]), direct)
     other = ModalModel(poles[1:] * 2, np.array([[3 + 1j]]), np.array([[2 + 6j]]), 3 * direct)
     plant = linear.side_by_side([linear._placed(one, (1, 3), (1, 2)), linear._placed(other, (2, 3), (0, 2))])
     assert plant.B.tolist() == [[0.0, 1.5], [0.0, 1.0], [0.0, 2.0], [3.0, 0.0], [1.0, 0.0]]
     assert plant.C.tolist() == [[0.0] * 5, [4.0, 6.0, 10.0, 0.0, 0.0], [0.0, 0.0, 0.0, 4.0, -12.0]]
-    assert plant.D.tolist() == [[0.0, 0.0], [0.0, 0.25], [0.75, 0.0]]
+    assert plant.D.tolist() == [[0.0, 0.0], [0.0, -0.25], [-0.75, 0.0]]
     assert np.sort_complex(np.linalg.eigvals(plant.A)) == pytest.approx(
         np.sort_complex([-3.0, -2 + 7j, -2 - 7j, -4 + 14j, -4 - 14j])
     )
