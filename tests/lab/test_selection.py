@@ -33,7 +33,6 @@ from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import correlation, propagated
-from microrad.lab.identify.statistics import propagated
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii

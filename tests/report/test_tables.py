@@ -47,7 +47,7 @@ def test_the_last_words_stand_below_each_other_on_a_narrow_terminal():
     assert "source: paper" not in table_text(wordy, 140)
 
 
-@pytest.mark.parametrize(("width", "parts"), [(46, 1), (45, 2), (30, 2), (27, 3)])
+@pytest.mark.parametrize(("width", "parts"), [(45, 1), (44, 2), (27, 2), (26, 3)])
 def test_numbers_that_a_terminal_has_no_room_for_stand_below_and_lose_no_digit(width, parts):
     table = Table(
         "tails", ("first", "one independent", "two", "independent samples"), [("PI", "7", "3", "35154")], (0, 3)
@@ -56,3 +56,17 @@ def test_numbers_that_a_terminal_has_no_room_for_stand_below_and_lose_no_digit(w
     assert len(table.parts(width)) == text.count("first") == text.count("PI") == parts
     assert text.count("tails") == 1
     assert {"7", "3", "35154", "independent", "samples", "one", "two"} <= set(text.split())
+
+
+@pytest.mark.parametrize("width", range(48, 69))
+def test_columns_of_words_share_what_is_left_without_breaking_a_word(width):
+    """At the least width each has its longest word; then the one that lacks most gets more, until no line is folded."""
+    headings = ("pointing error from", "one independent", "two", "independent samples")
+    table = Table("", headings, [("jitter as given", "7", "3", "35154")], (0, 3))
+    first, second, third, fourth = table.widths(width)
+    assert (second, third) == (15, 3)
+    assert first + fourth == min(8 + 11 + width - 48, 19 + 19)
+    assert first == 8 + width - 48 if width <= 52 else 0 <= first - fourth <= 1
+    text = table_text(table, width)
+    assert {*text.split()} >= {"pointing", "error", "from", "independent", "samples", "jitter", "given", "35154"}
+    assert max(map(len, text.splitlines())) <= width

@@ -206,6 +206,11 @@ class Limit:
     most: float | None
     source: str
 
+    @property
+    def worst_is_least(self) -> bool:
+        """Whether the worst value is the least one, as for each limit with ``least``; else it is the largest."""
+        return self.least is not None
+
 
 @dataclass(frozen=True, slots=True)
 class Progress:

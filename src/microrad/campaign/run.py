@@ -361,7 +361,7 @@ class _Runner:
         if self.campaign.table.loop is None or self.campaign.table.tail is not None or not self.campaign.limits:
             return []
         limit = self.campaign.limits[0]
-        sign = -1.0 if limit.least is not None else 1.0
+        sign = -1.0 if limit.worst_is_least else 1.0
         scored = (
             (sign * value, -int(row))
             for chunk in self.book.chunks(cell)

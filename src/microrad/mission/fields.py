@@ -265,11 +265,15 @@ class OrWord(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Several:
-    """A list of at least one quantity and of at most `most`; rising lists are strictly increasing."""
+    """A list of at least one quantity and of at most `most`; rising lists are strictly increasing.
+
+    `shown` is an example in TOML, where a list of one item would be refused.
+    """
 
     each: Quantity
     rising: bool = False
     most: int = MOST_ITEMS
+    shown: str = ""
 
     def read(self, value: object) -> tuple[float, ...]:
         """SI values of the list; raises `ProblemsError` with every item that does not fit."""
@@ -298,8 +302,8 @@ class Several:
 
     @property
     def example(self) -> str:
-        """A list of one item."""
-        return f'["{self.each.example}"]' if self.each.unit else f"[{self.each.example}]"
+        """A list of one item, unless another one is shown."""
+        return self.shown or f'["{self.each.example}"]' if self.each.unit else f"[{self.each.example}]"
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Read the list in place of pydantic's own tuple."""

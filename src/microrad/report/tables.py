@@ -114,14 +114,28 @@ class Table:
 
     def _least(self) -> int:
         """Columns of a terminal that the table takes with its numbers whole and with a word in each line of words."""
-        found = 0
+        return sum(least + 3 for least, _ in self._ranges())
+
+    def _ranges(self) -> list[tuple[int, int]]:
+        """Columns of a terminal that each column needs, and that it takes with no line folded."""
+        found = []
         for place, cells in enumerate(zip(self.headings, *self.rows, strict=True)):
             texts = [line for cell in cells for line in str(cell).split("\n")]
+            least = most = max(map(len, texts))
             if place in self.words:
-                longest = max((len(word) for text in texts for word in text.split()), default=0)
-                found += min(longest, _LEGIBLE) + 3
-            else:
-                found += max(map(len, texts)) + 3
+                least = min(max((len(word) for text in texts for word in text.split()), default=0), _LEGIBLE)
+            found.append((least, most))
+        return found
+
+    def widths(self, width: int) -> list[int]:
+        """Columns of a terminal for each column, of so many for all: the longest lines of words get what is left."""
+        ranges = self._ranges()
+        found = [least for least, _ in ranges]
+        for _ in range(width + 1 - self._least()):
+            lacking = [most - has for (_, most), has in zip(ranges, found, strict=True)]
+            if max(lacking) <= 0:
+                break
+            found[lacking.index(max(lacking))] += 1
         return found
 
     def parts(self, width: int) -> list["Table"]:
@@ -129,7 +143,7 @@ class Table:
         shown = self.for_width(width)
         kept, found = [0], []
         for column in range(1, len(shown.headings)):
-            if len(kept) > 1 and shown.columns([*kept, column])._least() > width:
+            if len(kept) > 1 and shown.columns([*kept, column])._least() > width + 1:
                 found.append(kept)
                 kept = [0]
             kept.append(column)
@@ -170,8 +184,8 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
     console = Console(file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False)
     for shown in (part for each in tables for part in each.parts(width)):
         table = Drawn(title=shown.title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-        for place, heading in enumerate(shown.headings):
-            table.add_column(heading, overflow="fold", no_wrap=place not in shown.words)
+        for place, (heading, columns) in enumerate(zip(shown.headings, shown.widths(width), strict=True)):
+            table.add_column(heading, overflow="fold", no_wrap=place not in shown.words, width=columns)
         for row in shown.rows:
             table.add_row(*map(str, row))
         console.print(table)

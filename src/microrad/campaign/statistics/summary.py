@@ -118,7 +118,7 @@ def _sensitivities(campaign: CampaignFile, cell: CellRows) -> tuple[Sensitivity,
 
 
 def _worst_first(limits: Sequence[Limit], traces: Sequence[WorstTrace]) -> tuple[WorstTrace, ...]:
-    sign = -1.0 if limits and limits[0].most is not None else 1.0
+    sign = -1.0 if limits and not limits[0].worst_is_least else 1.0
     return tuple(sorted(traces, key=lambda trace: (trace.cell, sign * trace.value, trace.row)))
 
 

@@ -39,7 +39,8 @@ Edges = Annotated[tuple[float, ...], Several(Quantity("Hz", least=0.0, most=1e12
 BandRms = Annotated[tuple[float, ...], Several(Quantity("rad", "urad", above=0.0, most=ANGLE_MOST))]
 Harmonics = Annotated[tuple[float, ...], Several(Quantity("", above=0.0, most=1e6))]
 WheelCoefficients = Annotated[tuple[float, ...], Several(Quantity("rad/Hz^2", "nrad/Hz^2", least=0.0, most=1.0))]
-Coupling = Annotated[tuple[float, ...], Several(Quantity("", least=-100.0, most=100.0))]
+_NO_COUPLING = "[1.0, 0.0, 0.0, 1.0]"
+Coupling = Annotated[tuple[float, ...], Several(Quantity("", least=-100.0, most=100.0), shown=_NO_COUPLING)]
 PowerOrZero = Annotated[float, Quantity("W", "pW", least=0.0, most=1e6)]
 ReceivedPower = Annotated[float, Quantity("W", "pW", above=0.0, most=1e6)]
 Convention = Annotated[
@@ -77,7 +78,7 @@ class GeometryTable(Table):
             yield from self._reach_problems()
         else:
             reason = f"has {len(self.coupling)} items"
-            yield Problem("coupling", reason, "four, row by row: coupling = [1.0, 0.0, 0.0, 1.0] would do")
+            yield Problem("coupling", reason, f"four, row by row: coupling = {_NO_COUPLING} would do")
 
     def _reach_problems(self) -> Iterator[Problem]:
         less = f"moves the line of sight over {WORST_CONDITION:g} times less in one direction than across it"
@@ -86,7 +87,7 @@ class GeometryTable(Table):
         if (singular and grazing) or self.incidence_rad >= ANGLE_MOST:
             yield Problem("incidence", f"grazes the mirror, which then {less}", 'incidence = "45 deg" would do')
         if singular and (not grazing or _singular(self.coupling, 1.0)):
-            yield Problem("coupling", f"is singular: it {less}", "coupling = [1.0, 0.0, 0.0, 1.0] would do")
+            yield Problem("coupling", f"is singular: it {less}", f"coupling = {_NO_COUPLING} would do")
 
 
 def _singular(coupling: tuple[float, ...], cos_incidence: float) -> bool:
