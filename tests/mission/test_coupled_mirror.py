@@ -1,14 +1,25 @@
 """Mirror files of version 2: what a bad one is told, and what the commands say that take one axis."""
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
+from made_tables import made, one_line, told
 from microrad.mission.fields import ProblemsError, Quantity
 from microrad.mission.file import MissionError, load_coupled_mirror, load_mirror, load_mission
-from microrad.mission.tables import coupled_parts
+from microrad.mission.tables import coupled_mirror, coupled_parts
 from microrad.mission.tables.coupled_mirror import CoupledMirror, in_order, on_a_line, parameters
-from microrad.mission.tables.coupled_parts import HysteresisTable, ModesTable, UncertaintyTable
+from microrad.mission.tables.coupled_parts import (
+    ActuatorTable,
+    HysteresisTable,
+    MatricesTable,
+    ModesTable,
+    OutputTable,
+    RecordingTable,
+    UncertaintyTable,
+    shape_problems,
+)
 from microrad.mission.toml import scan
 from places import ROOT
 from waiting import no_hang
@@ -905,3 +916,294 @@ def test_a_number_whose_products_are_none_is_refused():
 def test_numbered_tables_are_in_the_order_of_their_numbers():
     tables = {str(number): f"table {number}" for number in (1, 10, 11, 2, 3, 9)}
     assert in_order(tables) == tuple(f"table {number}" for number in (1, 2, 3, 9, 10, 11))
+
+
+MATRIX = coupled_parts._Matrix(Quantity(""))
+
+
+def refused(call, *given):
+    """The problems that a call raises."""
+    with pytest.raises(ProblemsError) as error:
+        call(*given)
+    return error.value.problems
+
+
+def named(*names):
+    """Tables with these names, by number."""
+    return {str(number): SimpleNamespace(name=name) for number, name in enumerate(names, 1)}
+
+
+def placed(*places):
+    """Displacements at these places, by number."""
+    tables = [SimpleNamespace(name=f"s{place}", quantity="displacement", position_m=place) for place in places]
+    return {str(number): table for number, table in enumerate(tables, 1)}
+
+
+def plays(*weights, **more):
+    """An element of plays, the first without a threshold."""
+    return made(HysteresisTable, model="plays", thresholds_v=(0.0, 1.0, 2.0)[: len(weights)], weights=weights, **more)
+
+
+def two_by_three(modes=None, hysteresis=None, **matrices):
+    """A mirror of three drives and two outputs, of two states and as many elements as are given."""
+    modes = modes or made(ModesTable, decay_1_s=(5.0,), frequency_rad_s=(40.0,))
+    elements = {str(number): table for number, table in enumerate(hysteresis or (), 1)}
+    outputs = {"1": SimpleNamespace(name="x", quantity="angle"), "2": SimpleNamespace(name="y", quantity="angle")}
+    return made(
+        CoupledMirror,
+        actuators=named("a", "b", "c"),
+        outputs=outputs,
+        modes=modes,
+        hysteresis=elements,
+        matrices=made(MatricesTable, **matrices),
+    )
+
+
+ALL_OF_SEVERAL_AXES = {
+    "rows that are none": (
+        lambda: refused(MATRIX.read, [[1.0], 2.0]),
+        """
+        is no list of rows: expected a list of rows, each a list of numbers without quotes: [[1.0, 0.0], [0.0, 1.0]]
+        """,
+    ),
+    "rows of which the second and third are wrong": (
+        lambda: refused(MATRIX.read, [[1.0], [2.0, "3"], []]),
+        """
+        row 2: item 2: "3" is not a plain number; expected a number without quotes, for example "1.0": expected a
+        list of rows, each a list of numbers without quotes; row 3: is not a list with something in it: expected a
+        list of rows, each a list of numbers without quotes
+        """,
+    ),
+    "an actuator of no range": (
+        lambda: made(ActuatorTable, drive_min_v=12.5, drive_max_v=12.5, bias_v=1.0).problems(),
+        """drive_max is not above drive_min (12.5 V): expected a voltage above 12.5 V""",
+    ),
+    "an actuator with a bias out of its range": (
+        lambda: made(ActuatorTable, drive_min_v=-2.5, drive_max_v=12.5, bias_v=-3.0).problems(),
+        """bias is outside drive_min to drive_max (-2.5 V to 12.5 V): expected -2.5 V to 12.5 V""",
+    ),
+    "an angle at a place of three numbers": (
+        lambda: made(OutputTable, quantity="angle", position_m=(0.0, 0.1, 0.2)).problems(),
+        """
+        position stands with an angle, which is alike everywhere on a mirror: expected this line removed; position
+        has 3 coordinates: expected x and y in the plane of the mirror: position = ["30 mm", "0 mm"]
+        """,
+    ),
+    "a recording of no band, beyond half of its rate": (
+        lambda: made(RecordingTable, excited_from_hz=1300.0, excited_to_hz=1275.0, rate_hz=2500.0).problems(),
+        """
+        excited_to is not above excited_from: expected a band that goes up; excited_to is above half the rate (1.25
+        kHz): expected at most 1.25 kHz
+        """,
+    ),
+    "modes that grow, and too few frequencies": (
+        lambda: made(ModesTable, decay_1_s=(5.0, 0.0, -2.5), frequency_rad_s=(40.0, 0.0)).problems(),
+        """
+        decay item 2 is 0 1/s: an unstable mode, which does not die out: expected above 0 1/s; decay item 3 is -2.5
+        1/s: an unstable mode, which does not die out: expected above 0 1/s; frequency has 2 items where decay has
+        3: expected one for each mode, "0 rad/s" for a real one
+        """,
+    ),
+    "plays with what a loop has": (
+        lambda: made(
+            HysteresisTable,
+            model="plays",
+            thresholds_v=(0.0, 1.0),
+            weights=(0.0, 0.0, 0.0),
+            widening_s=1e-6,
+            alpha_1_v=1.0,
+            bias_v=0.0,
+            polynomial=(0.0, 0.0),
+        ).problems(),
+        """
+        alpha does not belong to model = "plays": expected this line removed, or model = "bouc-wen"; bias does not
+        belong to model = "plays": expected this line removed, or model = "bouc-wen"; rate_limit is missing, and the
+        element depends on the rate: expected rate_limit = "1 kV/s"; weights has 3 items where thresholds has 2:
+        expected one weight for each threshold; weights is zero throughout, so the element acts on nothing: expected
+        a weight other than 0, or a polynomial beside them; polynomial has 2 items: expected three: of s^2, of |s| s
+        and of s^3, such as [0.0, 0.01, -0.02]; reach is missing beside polynomial: expected reach = "2 V"
+        """,
+    ),
+    "plays with a reach and without weights": (
+        lambda: made(HysteresisTable, model="plays", thresholds_v=(0.0, 1.0), reach_v=2.0).problems(),
+        """weights is missing, and model = "plays" needs it: expected weights = [0.8, 0.1] would do""",
+    ),
+    "plays with a reach and without a polynomial": (
+        lambda: made(
+            HysteresisTable, model="plays", thresholds_v=(0.0, 1.0), weights=(0.5, 0.25), reach_v=2.0
+        ).problems(),
+        """polynomial is missing beside reach: expected polynomial = [0.0, 0.01, -0.02]""",
+    ),
+    "a loop with what plays have, that grows": (
+        lambda: made(
+            HysteresisTable,
+            model="bouc-wen",
+            d1=0.0,
+            epsilon=0.0,
+            alpha_1_v=1.0,
+            beta_1_v=0.75,
+            gamma_1_v=0.5,
+            eta_1_v=-0.25,
+            d2_s_v=0.1,
+            reach_v=1.0,
+        ).problems(),
+        """
+        reach does not belong to model = "bouc-wen": expected this line removed, or model = "plays"; rate_limit is
+        missing, and the element depends on the rate: expected rate_limit = "1 kV/s"; alpha is not above what beta,
+        gamma and eta take off it (1.5 1/V), so h would grow without bound: expected above 1.5 1/V; d1 is 0 beside
+        an epsilon of 0, so the element acts on nothing: expected one of them other than 0
+        """,
+    ),
+    "a loop with nothing but its rate": (
+        lambda: made(HysteresisTable, model="bouc-wen", delta_s_v=0.25).problems(),
+        """
+        d1 is missing, and model = "bouc-wen" needs it: expected d1 = 0.8 would do; epsilon is missing, and model =
+        "bouc-wen" needs it: expected epsilon = -0.2 would do; alpha is missing, and model = "bouc-wen" needs it:
+        expected alpha = "2 1/V" would do; beta is missing, and model = "bouc-wen" needs it: expected beta = "0.5
+        1/V" would do; rate_limit is missing, and the element depends on the rate: expected rate_limit = "1 kV/s"
+        """,
+    ),
+    "rows of other lengths": (
+        lambda: shape_problems("B", ((1.0, 2.0), (1.0,), (1.0, 2.0, 3.0), (1.0,)), (3, "states"), (2, "actuators")),
+        """
+        B has 4 rows where there are 3 states: expected one row for each, in order; B row 2 has 1 numbers where
+        there are 2 actuators; 2 other rows do not fit, either: expected 2 numbers in each row
+        """,
+    ),
+    "a factor beside a correlation that counts otherwise": (
+        lambda: made(
+            UncertaintyTable,
+            parameters=("a", "b", "c"),
+            standard_errors=(0.1,),
+            factor=((1.0, 0.0), (0.75, 0.75), (0.5, 0.5)),
+            correlation=(0.5, 0.25),
+        ).problems(),
+        """
+        standard_errors has 1 items where parameters has 3: expected one standard error for each parameter;
+        correlation stands beside factor: expected one of the two removed; factor row 2 has the length 1.06066, so
+        the correlation with itself is not 1; 2 of 3 rows have another length than 1: expected rows of length 1;
+        correlation has 2 items where 3 parameters have 3 pairs: expected 3 numbers, the lower triangle without the
+        diagonal, or none
+        """,
+    ),
+    "correlations that cannot be": (
+        lambda: made(
+            UncertaintyTable,
+            parameters=("a", "b", "c"),
+            standard_errors=(0.1, 0.2, 0.3),
+            correlation=(0.875, 0.75, -0.5),
+        ).problems(),
+        """
+        correlation is not positive semidefinite: its smallest eigenvalue is -0.428: expected correlations that can
+        be together, as the fit gave them
+        """,
+    ),
+    "tables that are not there, and displacements on a line": (
+        lambda: made(
+            CoupledMirror, actuators={}, outputs=placed((0.0, 0.0), (0.25, 0.5), (0.5, 1.0)), hysteresis={}
+        ).problems(),
+        """
+        actuators is empty: expected a table [actuators.1]; outputs has all displacements on one line, so a tilt
+        about that line moves none: expected three displacements with a position, not on one line, or no position
+        """,
+    ),
+    "tables that are counted otherwise, of one name": (
+        lambda: made(
+            CoupledMirror,
+            actuators={
+                "1": SimpleNamespace(name="a"),
+                "3": SimpleNamespace(name="b"),
+                "2b": SimpleNamespace(name="a"),
+                "4": SimpleNamespace(name="a"),
+            },
+            outputs=placed((0.0, 0.0), None, (0.5, 1.0), None),
+            hysteresis={"0": 0},
+        ).problems(),
+        """
+        actuators has "2b" where its 4 tables are counted from 1: expected [actuators.1], [actuators.2],
+        [actuators.3]; actuators has two tables of the name "a": expected a name of its own for each; outputs has
+        two tables of the name "sNone": expected a name of its own for each; hysteresis has "0" where its 1 tables
+        are counted from 1: expected [hysteresis.1]; outputs.2.position is missing, while other displacements have
+        one: expected a position of each displacement, or of none; outputs.4.position is missing, while other
+        displacements have one: expected a position of each displacement, or of none
+        """,
+    ),
+    "displacements of which two have places": (
+        lambda: coupled_mirror._place_problems(placed((0.0, 0.0), (0.5, 1.0))),
+        """
+        outputs has 2 displacements with a position, too few for two tilts and a piston: expected three
+        displacements with a position, not on one line, or no position
+        """,
+    ),
+    "matrices of other shapes, without elements and outputs of the states": (
+        lambda: two_by_three(
+            B=((1.0, 2.0), (3.0, 4.0)), D=((1.0, 2.0, 3.0),), E=((1.0,),), G=((1.0, 2.0, 3.0),)
+        ).problems(),
+        """
+        matrices.B row 1 has 2 numbers where there are 3 actuators; 1 other rows do not fit, either: expected 3
+        numbers in each row; matrices.D has 1 rows where there are 2 outputs: expected one row for each, in order;
+        matrices.E stands without a table [hysteresis.1]: expected it, or this line removed; matrices.G stands
+        without a table [hysteresis.1]: expected it, or this line removed; matrices has no C, so none of the 2
+        states is seen in an output: expected C, with a row for each output, or the table [modes] removed
+        """,
+    ),
+    "an element that acts on nothing, and one that nothing drives": (
+        lambda: two_by_three(
+            hysteresis=(plays(0.25), plays(0.5)),
+            C=((1.0, 0.0), (0.0, 1.0)),
+            E=((0.0, 1.0), (0.0, 2.0)),
+            F=((1.0, 0.0), (0.0, 0.0)),
+            G=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ).problems(),
+        """
+        hysteresis.1 acts on nothing: column 1 of E and of K is zero: expected a number other than 0 there, or this
+        element removed from all matrices; hysteresis.2 is driven by nothing: row 2 of F and of G is zero: expected
+        a number other than 0 there, or this element removed from all matrices
+        """,
+    ),
+    "elements that are fed back and depend on the rate": (
+        lambda: two_by_three(
+            hysteresis=(plays(0.25, widening_s=2e-6), made(HysteresisTable, model="bouc-wen", delta_s_v=0.125)),
+            C=((1.0, 0.0), (0.0, 1.0)),
+            F=((0.0, 1.0), (1.0, 0.0)),
+            K=((1.0, 0.0), (0.0, 1.0)),
+        ).problems(),
+        """
+        hysteresis.1.widening makes an element depend on the rate that row 1 of F feeds back: expected this line
+        removed, or a row of zeros in F; hysteresis.2.delta makes an element depend on the rate that row 2 of F
+        feeds back: expected this line removed, or a row of zeros in F
+        """,
+    ),
+    "a loop without end in its stiffness": (
+        lambda: two_by_three(
+            modes=made(ModesTable, decay_1_s=(5.0, 3.0), frequency_rad_s=(0.0, 0.0)),
+            hysteresis=(made(HysteresisTable, model="bouc-wen", d1=1.25), plays(0.5, 0.25)),
+            C=((1.0, 0.0), (0.0, 1.0)),
+            E=((2.0, 0.5), (0.0, 1.0)),
+            F=((3.0, 0.25), (0.0, 1.0)),
+        ).problems(),
+        """
+        hysteresis makes the mirror run away: where its elements slide it grows by 2.5 1/s, whatever the drive:
+        expected smaller weights, or smaller numbers in E or F
+        """,
+    ),
+    "elements whose stiffness runs away": (
+        lambda: two_by_three(
+            modes=made(ModesTable, decay_1_s=(5.0, 3.0), frequency_rad_s=(0.0, 0.0)),
+            hysteresis=(plays(1.5, 2.25), plays(0.5, 0.25)),
+            C=((1.0, 0.0), (0.0, 1.0)),
+            E=((2.0, 0.5), (0.0, 1.0)),
+            F=((3.0, 0.25), (0.0, 1.0)),
+        ).problems(),
+        """
+        hysteresis makes the mirror run away: where its elements slide it grows by 17.5 1/s, whatever the drive:
+        expected smaller weights, or smaller numbers in E or F
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_SEVERAL_AXES)
+def test_all_that_does_not_fit_in_a_mirror_of_several_axes_is_told_in_full(what):
+    problems, words = ALL_OF_SEVERAL_AXES[what]
+    assert told(problems()) == one_line(words)

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,9 +21,13 @@ from day_files import (
     element_set,
     ephemeris,
 )
+from made_tables import made, one_line, told
 from microrad import orbit
 from microrad.mission.file import MissionError, load_link, load_mission
-from microrad.mission.tables.operations import Constellation, Downlink
+from microrad.mission.model import _both_fly, _needs_operations, _scan_there
+from microrad.mission.tables.acquisition import Scan
+from microrad.mission.tables.operations import Constellation, ContactTable, Downlink, OpticalDownlink
+from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit import operations
 from microrad.orbit.base import required
 from optical_files import KIRUNA_SITE, optical, shared_stations
@@ -613,3 +618,237 @@ def test_the_tables_of_stations_are_equal_and_hashed_by_what_is_in_them(tmp_path
 def test_a_constellation_needs_no_station_and_a_day_no_network(tmp_path):
     m = day_file(tmp_path).mission
     assert m.operations.optical is None and m.constellation.stations == {}
+
+
+ALL_OF_A_DAY = {
+    "a constellation of much that does not fit": (
+        lambda: made(
+            Constellation,
+            pattern="star",
+            satellites=13,
+            planes=4,
+            phasing=7,
+            file="a.tle",
+            overhead_s=61.5,
+            shortest_s=61.5,
+            session_s=45.0,
+            relays={},
+            stations={},
+        ).problems(),
+        """
+        file does not belong to pattern = "star": expected this line removed; planes does not divide satellites =
+        13: expected a divisor of it; phasing is not below planes = 4: expected 0 to 3; shortest is not above
+        overhead: such a session would carry no data: expected more than 61.5 s; session is below shortest: expected
+        at least 61.5 s; relays holds no relay: expected a table such as [constellation.relays.east]
+        """,
+    ),
+    "a constellation whose second station is a relay": (
+        lambda: made(
+            Constellation,
+            pattern="delta",
+            satellites=12,
+            overhead_s=60.0,
+            shortest_s=90.0,
+            session_s=80.0,
+            relays={"west": 0, "east": 0},
+            stations={"kiruna": 0, "east": 0},
+        ).problems(),
+        """
+        planes is missing, and pattern = "delta" needs it: expected planes = 1 would do; phasing is missing, and
+        pattern = "delta" needs it: expected phasing = 1 would do; session is below shortest: expected at least 90
+        s; stations.east is the name of a relay, too: expected a name of its own
+        """,
+    ),
+    "a constellation of a file with three keys too many": (
+        lambda: made(
+            Constellation,
+            pattern="file",
+            satellites=14,
+            planes=5,
+            phasing=5,
+            overhead_s=1.5,
+            shortest_s=2.5,
+            session_s=3.5,
+            relays={"east": 0},
+            stations={},
+        ).problems(),
+        """
+        satellites does not belong to pattern = "file": expected this line removed; planes does not belong to
+        pattern = "file": expected this line removed; phasing does not belong to pattern = "file": expected this
+        line removed; file is missing, and pattern = "file" needs it: expected file = "satellites.tle" would do;
+        planes does not divide satellites = 14: expected a divisor of it; phasing is not below planes = 5: expected
+        0 to 4
+        """,
+    ),
+    "a contact that holds as long as it looks": (
+        lambda: made(ContactTable, window_s=0.25, hold_s=0.25).problems(),
+        """hold is not below window (250 ms): a window would never show a loss: expected below 250 ms""",
+    ),
+    "a downlink to nowhere": (
+        lambda: made(Downlink, stations={}).problems(),
+        """stations holds no station: expected a table such as [operations.downlink.stations.kiruna]""",
+    ),
+    "an optical downlink to nowhere": (
+        lambda: made(OpticalDownlink, stations={}).problems(),
+        """stations holds no station: expected a table such as [operations.optical.stations.tenerife]""",
+    ),
+    "an optical downlink to everywhere": (
+        lambda: made(OpticalDownlink, stations=dict.fromkeys(range(117))).problems(),
+        """stations holds 117 stations: expected at most 100""",
+    ),
+    "a free body with what a held one has": (
+        lambda: made(VisibilityLimits, attitude="free", boresight=(0.06, 0.07), field_of_regard_rad=1.2).problems(),
+        """
+        boresight does not belong to attitude = "free": the body turns: expected this line removed; field_of_regard
+        does not belong to attitude = "free": the body turns: expected this line removed; boresight has 2 items:
+        expected three: boresight = [0.0, 0.0, -1.0]
+        """,
+    ),
+    "a body held to the sun without both": (
+        lambda: made(VisibilityLimits, attitude="sun").problems(),
+        """
+        boresight is missing, and attitude = "sun" needs it: expected boresight = [0.0, 0.0, -1.0] would do;
+        field_of_regard is missing, and attitude = "sun" needs it: expected field_of_regard = "70 deg" would do
+        """,
+    ),
+    "a body held to the earth that looks nowhere": (
+        lambda: made(
+            VisibilityLimits, attitude="nadir", boresight=(0.0, 0.06, 0.07), field_of_regard_rad=1.2
+        ).problems(),
+        """boresight has no direction: expected one such as boresight = [0.0, 0.0, -1.0]""",
+    ),
+    "a circle with everything of others": (
+        lambda: made(
+            OrbitTable,
+            kind="circular",
+            altitude_m=5e5,
+            semi_major_axis_m=7e6,
+            eccentricity=0.0,
+            inclination_rad="sun-synchronous",
+            node_rad=0.0,
+            local_time_s=0.0,
+            argument_of_perigee_rad=0.0,
+            mean_anomaly_rad=0.0,
+            phase_rad=0.0,
+            gravity="two-body",
+            longitude_rad=0.0,
+            latitude_rad=0.0,
+            height_m=0.0,
+            mask_rad=0.3,
+            file="a.tle",
+            object="A",
+        ).problems(),
+        """
+        semi_major_axis does not belong to kind = "circular": expected this line removed; eccentricity does not
+        belong to kind = "circular": expected this line removed; argument_of_perigee does not belong to kind =
+        "circular": expected this line removed; mean_anomaly does not belong to kind = "circular": expected this
+        line removed; longitude does not belong to kind = "circular": expected this line removed; latitude does not
+        belong to kind = "circular": expected this line removed; height does not belong to kind = "circular":
+        expected this line removed; mask does not belong to kind = "circular": expected this line removed; file does
+        not belong to kind = "circular": expected this line removed; object does not belong to kind = "circular":
+        expected this line removed; gravity is "two-body", in which no node follows the Sun, and inclination is
+        "sun-synchronous": expected gravity = "j2", or an inclination in degrees; node stands beside local_time:
+        expected one of the two removed
+        """,
+    ),
+    "an ellipse with nothing": (
+        lambda: made(OrbitTable, kind="keplerian").problems(),
+        """
+        semi_major_axis is missing, and kind = "keplerian" needs it: expected semi_major_axis = "7000 km" would do;
+        eccentricity is missing, and kind = "keplerian" needs it: expected eccentricity = 0.001 would do;
+        inclination is missing, and kind = "keplerian" needs it: expected inclination = "97.4 deg" would do;
+        argument_of_perigee is missing, and kind = "keplerian" needs it: expected argument_of_perigee = "90 deg"
+        would do; mean_anomaly is missing, and kind = "keplerian" needs it: expected mean_anomaly = "0 deg" would
+        do; gravity is missing, and kind = "keplerian" needs it: expected gravity = "j2" would do; node is missing,
+        and so is local_time: expected node = "0 deg" or local_time = "10.5 h" would do
+        """,
+    ),
+    "a circle with nothing": (
+        lambda: made(OrbitTable, kind="circular", local_time_s=0.0).problems(),
+        """
+        altitude is missing, and kind = "circular" needs it: expected altitude = "500 km" would do; inclination is
+        missing, and kind = "circular" needs it: expected inclination = "97.4 deg" would do; phase is missing, and
+        kind = "circular" needs it: expected phase = "0 deg" would do; gravity is missing, and kind = "circular"
+        needs it: expected gravity = "j2" would do
+        """,
+    ),
+    "a station that is held": (
+        lambda: made(
+            OrbitTable, kind="station", node_rad=0.0, mask_rad=0.3, limits=SimpleNamespace(attitude="sun")
+        ).problems(),
+        """
+        node does not belong to kind = "station": expected this line removed; longitude is missing, and kind =
+        "station" needs it: expected longitude = "-16.5 deg" would do; latitude is missing, and kind = "station"
+        needs it: expected latitude = "28.3 deg" would do; height is missing, and kind = "station" needs it:
+        expected height = "2400 m" would do; limits.attitude is "sun", and a station has none: expected "free"
+        """,
+    ),
+    "a slot with a satellite of a file": (
+        lambda: made(
+            OrbitTable, kind="geostationary", inclination_rad="sun-synchronous", gravity="two-body", object="A"
+        ).problems(),
+        """
+        inclination does not belong to kind = "geostationary": expected this line removed; gravity does not belong
+        to kind = "geostationary": expected this line removed; longitude is missing, and kind = "geostationary"
+        needs it: expected longitude = "143 deg" would do; object does not belong to kind = "geostationary":
+        expected this line removed
+        """,
+    ),
+    "elements with the wrong keys": (
+        lambda: made(OrbitTable, kind="elements", object="A", longitude_rad=1.0).problems(),
+        """
+        longitude does not belong to kind = "elements": expected this line removed; file is missing, and kind =
+        "elements" needs it: expected file = "satellite.tle" would do
+        """,
+    ),
+    "two stations": (
+        lambda: made(Orbits, leo=SimpleNamespace(kind="station"), geo=SimpleNamespace(kind="station")).problems(),
+        """
+        geo.kind is "station", as is leo.kind: one of the two has to fly: expected another kind of orbit
+        """,
+    ),
+    "a raster whose rows do not overlap": (
+        lambda: made(Scan, pattern="raster", overlap=0.00075).problems(),
+        """
+        overlap is 0.00075: between two tracks of pattern = "raster" a target is seen for no time: expected at least
+        0.001; overlap = 0.25 or pattern = "step-stare" would do
+        """,
+    ),
+    "a scan that is not there": (
+        lambda: _scan_there(SimpleNamespace(acquisition="scan"), SimpleNamespace(scan=None)),
+        """
+        operations.acquisition is "scan", and the mission has no table acquisition.scan: expected the table
+        [acquisition.scan], or "wide beacon"
+        """,
+    ),
+    "a constellation without operations": (
+        lambda: _needs_operations(None, SimpleNamespace()),
+        """
+        constellation stands without the table operations: expected the table [operations], which microrad init
+        writes
+        """,
+    ),
+    "a day of a station below a relay": (
+        lambda: _both_fly(SimpleNamespace(station="leo"), SimpleNamespace(downlink=0, optical=0), SimpleNamespace()),
+        """
+        operations.downlink stands beside orbit.leo of kind "station", and means a satellite there: expected the
+        table removed, or the station as orbit.geo and the satellite as orbit.leo; operations.optical stands beside
+        orbit.leo of kind "station", and means a satellite there: expected the table removed, or the station as
+        orbit.geo and the satellite as orbit.leo; constellation stands beside orbit.leo of kind "station", and means
+        a satellite there: expected the table removed, or the station as orbit.geo and the satellite as orbit.leo
+        """,
+    ),
+    "a day of a station above a satellite": (
+        lambda: _both_fly(SimpleNamespace(station="geo"), SimpleNamespace(downlink=0, optical=0), SimpleNamespace()),
+        """
+        constellation stands beside orbit.geo of kind "station", and means a satellite there: expected the table
+        removed, or a relay as orbit.geo
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_DAY)
+def test_all_that_does_not_fit_in_a_table_of_a_day_is_told_in_full(what):
+    problems, words = ALL_OF_A_DAY[what]
+    assert told(problems()) == one_line(words)

@@ -2,18 +2,28 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from made_tables import made, one_line, told
 from microrad.loop import disturbance, sensor
 from microrad.mirror import geometry
 from microrad.mission.file import MissionError, load_mission
 from microrad.mission.model import mission_schema
 from microrad.mission.tables import fine_pointing as fine_pointing_table
-from microrad.mission.tables.fine_pointing import FinePointing, GeometryTable
+from microrad.mission.tables.fine_pointing import (
+    FinePointing,
+    GeometryTable,
+    MisalignmentTable,
+    OpticalSensorTable,
+    VibrationTable,
+    WheelsTable,
+    clock_problems,
+)
 from microrad.mission.toml import scan
 from places import ROOT
 
@@ -614,3 +624,213 @@ def test_the_highest_harmonic_of_a_wheel_is_judged_wherever_it_stands(refuse, ha
     fault = refuse(edited(("wheels.harmonics", harmonics), text=uncommented("fine_pointing.wheels")))
     assert fault.key == "fine_pointing.wheels.speed"
     assert "puts harmonic 2000 at " in fault.reason
+
+
+def clocked(**changes):
+    """A loop of 6.25 kHz in steps of 40 us, in which all fits."""
+    given = {
+        "rate_hz": 6250.0,
+        "delay_s": 80e-6,
+        "plant_step_s": 40e-6,
+        "reference_filter_hz": 3124.0,
+        "duration_s": 2.5,
+        "settle_s": 0.75,
+        "optical_sensor": SimpleNamespace(rate_hz=1250.0, delay_s=120e-6),
+        "vibration": SimpleNamespace(corner_hz=None, edges_hz=None),
+        "body": SimpleNamespace(bandwidth_hz=0.2),
+        "wheels": None,
+    }
+    return made(FinePointing, **given | changes)
+
+
+ALL_OF_A_LOOP = {
+    "nothing": (
+        lambda: clocked().problems(),
+        """
+
+        """,
+    ),
+    "a mirror alone with a radius, that grazes and is singular besides": (
+        lambda: made(
+            GeometryTable,
+            layout="two-axis",
+            actuator_radius_m=0.01,
+            coupling=(1.0, 2.0, 2.0, 4.0),
+            incidence_rad=math.pi / 2,
+        ).problems(),
+        """
+        actuator_radius does not belong to layout = "two-axis": expected this line removed, or layout = "tripod";
+        incidence grazes the mirror, which then moves the line of sight over 10000 times less in one direction than
+        across it: expected incidence = "45 deg" would do; coupling is singular: it moves the line of sight over
+        10000 times less in one direction than across it: expected coupling = [1.0, 0.0, 0.0, 1.0] would do
+        """,
+    ),
+    "a tripod without one that grazes": (
+        lambda: made(
+            GeometryTable, layout="tripod", coupling=(1.0, 0.0, 0.0, 1.0), incidence_rad=math.pi / 2 - 0.9e-4
+        ).problems(),
+        """
+        actuator_radius is missing, and layout = "tripod" needs it: expected actuator_radius = "10 mm" would do;
+        incidence grazes the mirror, which then moves the line of sight over 10000 times less in one direction than
+        across it: expected incidence = "45 deg" would do
+        """,
+    ),
+    "a coupling of five": (
+        lambda: made(GeometryTable, layout="two-axis", coupling=(1.0, 0.0, 0.0, 1.0, 1.0)).problems(),
+        """coupling has 5 items: expected four, row by row: coupling = [1.0, 0.0, 0.0, 1.0] would do""",
+    ),
+    "a spectrum by bands with what others have": (
+        lambda: made(
+            VibrationTable,
+            spectrum="bands",
+            level_rad2_hz=0.0,
+            file="a.csv",
+            edges_hz=(0.0, 1.0, 2.0, 4.0),
+            rms_rad=(1e-6,),
+        ).problems(),
+        """
+        level does not belong to spectrum = "bands": expected this line removed, or spectrum = "first-order"; file
+        does not belong to spectrum = "bands": expected this line removed, or spectrum = "table"; rms has 1 item
+        where edges has 4: expected 3 items, one for each band between the edges
+        """,
+    ),
+    "a spectrum of a table without it": (
+        lambda: made(VibrationTable, spectrum="table", corner_hz=1.0, rms_rad=(1e-6,)).problems(),
+        """
+        corner does not belong to spectrum = "table": expected this line removed, or spectrum = "first-order"; rms
+        does not belong to spectrum = "table": expected this line removed, or spectrum = "bands"; file is missing,
+        and spectrum = "table" needs it: expected file = "spectrum.csv" would do
+        """,
+    ),
+    "a spectrum of one edge": (
+        lambda: made(VibrationTable, spectrum="bands", edges_hz=(0.0,), rms_rad=(1e-6, 2e-6)).problems(),
+        """
+        edges has 1 item, and a band has two edges: expected two or more: edges = ["0 Hz", "1 Hz"] and rms = ["8.6
+        urad"] would do
+        """,
+    ),
+    "a spectrum of one band with three values": (
+        lambda: made(VibrationTable, spectrum="bands", edges_hz=(0.0, 8.0), rms_rad=(1e-6, 2e-6, 3e-6)).problems(),
+        """rms has 3 items where edges has 2: expected 1 item, for the one band between the edges""",
+    ),
+    "a spectrum of first order with nothing": (
+        lambda: made(VibrationTable, spectrum="first-order").problems(),
+        """
+        level is missing, and spectrum = "first-order" needs it: expected level = "160 urad^2/Hz" would do; corner
+        is missing, and spectrum = "first-order" needs it: expected corner = "1 Hz" would do
+        """,
+    ),
+    "a wheel with one coefficient": (
+        lambda: made(WheelsTable, harmonics=(1.0, 2.0, 5.2), coefficients_rad_hz2=(1e-9,)).problems(),
+        """
+        coefficients has 1 item where harmonics has 3: expected 3 of them, one coefficient for each harmonic
+        """,
+    ),
+    "a wheel with three coefficients": (
+        lambda: made(WheelsTable, harmonics=(1.0, 5.2), coefficients_rad_hz2=(1e-9, 2e-9, 3e-9)).problems(),
+        """
+        coefficients has 3 items where harmonics has 2: expected 2 of them, one coefficient for each harmonic
+        """,
+    ),
+    "a misalignment about three axes and one": (
+        lambda: made(MisalignmentTable, offset_rad=(0.0, 0.0, 0.0), drift_rad_s=(0.0,)).problems(),
+        """
+        offset has 3 items: expected two, for x and y: offset = ["1 urad", "1 urad"]; drift has 1 items: expected
+        two, for x and y: drift = ["1 urad/s", "1 urad/s"]
+        """,
+    ),
+    "a sensor without noise": (
+        lambda: made(OpticalSensorTable).problems(),
+        """
+        noise is missing, and so is the table quad_cell: expected noise = "1 urad" would do, or a table quad_cell
+        """,
+    ),
+    "a sensor with two": (
+        lambda: made(OpticalSensorTable, noise_rad=0.0, quad_cell=0).problems(),
+        """noise stands beside the table quad_cell: expected one of the two removed""",
+    ),
+    "a clock whose delays and sensor fall between steps and samples": (
+        lambda: clocked(delay_s=95e-6, optical_sensor=SimpleNamespace(rate_hz=1700.0, delay_s=130e-6)).problems(),
+        """
+        delay is no whole number of plant_step: expected delay = "80 µs" would do; optical_sensor.rate does not
+        divide fine_pointing.rate (6.25 kHz): readings would fall between control samples: expected rate = "1.5625
+        kHz" would do; optical_sensor.delay is no whole number of plant_step: expected delay = "120 µs" would do
+        """,
+    ),
+    "a step that does not divide the period": (
+        lambda: clocked(
+            plant_step_s=45e-6, delay_s=90e-6, optical_sensor=SimpleNamespace(rate_hz=2600.0, delay_s=135e-6)
+        ).problems(),
+        """
+        plant_step does not divide the control period 1 / fine_pointing.rate (160 µs): expected a whole fraction of
+        it: plant_step = "40 µs" would do; optical_sensor.rate does not divide fine_pointing.rate (6.25 kHz):
+        readings would fall between control samples: expected rate = "2.08333333333 kHz" would do
+        """,
+    ),
+    "a step that is nothing beside the delay of the sensor": (
+        lambda: clocked(
+            plant_step_s=320e-12, delay_s=0.0, optical_sensor=SimpleNamespace(rate_hz=6250.0001, delay_s=321e-6)
+        ).problems(),
+        """
+        optical_sensor.rate is above fine_pointing.rate (6.25 kHz): the controller would miss some of its readings:
+        expected rate = "6.25 kHz" would do; optical_sensor.delay is more than 1000000 times
+        fine_pointing.plant_step: expected a shorter delay: delay = "0 us" would do
+        """,
+    ),
+    "a step that is nothing beside the period": (
+        lambda: clocked(plant_step_s=120e-12, optical_sensor=SimpleNamespace(rate_hz=1e-3, delay_s=0.0)).problems(),
+        """
+        plant_step goes more than 1000000 times into the control period or the delay: expected a step nearer to 1 /
+        fine_pointing.rate; optical_sensor.rate is less than fine_pointing.rate (6.25 kHz) divided by 1000000:
+        expected a faster sensor: rate = "6.25 kHz" would do
+        """,
+    ),
+    "a run without end": (
+        lambda: clocked(duration_s=16001.0).problems(),
+        """
+        duration is more than 100000000 samples of fine_pointing.rate: expected more runs that are shorter: duration
+        = "8000 s" would do
+        """,
+    ),
+    "a run that settles to its end": (
+        lambda: clocked(settle_s=2.5).problems(),
+        """settle is not less than duration (2.5 s): expected settle = "500 ms" would do""",
+    ),
+    "a run without a sample behind the settling": (
+        lambda: clocked(settle_s=2.49995).problems(),
+        """
+        duration leaves no control sample behind settle: expected a longer run: duration = "2.82 s" would do
+        """,
+    ),
+    "a filter and a body that are too fast": (
+        lambda: clocked(reference_filter_hz=3125.0, body=SimpleNamespace(bandwidth_hz=12500.0)).problems(),
+        """
+        body.bandwidth is not below half of 1 / fine_pointing.plant_step (12.5 kHz): expected bandwidth = "2.5 kHz"
+        would do; reference_filter is not below half of fine_pointing.rate (3.125 kHz): expected reference_filter =
+        "1.25 kHz" would do
+        """,
+    ),
+    "disturbances beyond the steps of the plant": (
+        lambda: clocked(
+            vibration=SimpleNamespace(corner_hz=13e3, edges_hz=(1.0, 14e3)),
+            wheels=SimpleNamespace(speed_hz=250.0, harmonics=(64.0, 2.0, 4.0)),
+        ).problems(),
+        """
+        vibration.corner is not below half of 1 / fine_pointing.plant_step (12.5 kHz): expected corner = "2.5 kHz"
+        would do; vibration.edges reaches 14 kHz, not below half of 1 / fine_pointing.plant_step (12.5 kHz):
+        expected edges that end below 12.5 kHz, at 2.5 kHz for example; wheels.speed puts harmonic 64 at 16 kHz, not
+        below half of 1 / fine_pointing.plant_step (12.5 kHz): expected speed = "39.06 Hz" would do, or without that
+        harmonic
+        """,
+    ),
+    "the clock of another table": (
+        lambda: clock_problems("control", 4000.0, 33e-6, 10e-6),
+        """delay is no whole number of plant_step: expected delay = "30 µs" would do""",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_LOOP)
+def test_all_that_does_not_fit_in_a_table_of_the_loop_is_told_in_full(what):
+    problems, words = ALL_OF_A_LOOP[what]
+    assert told(problems()) == one_line(words)

@@ -1,6 +1,7 @@
 """A station as one end of a link: its range and elevation against vectors, and each refusal with its advice."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from scipy.optimize import brentq
 
 from ground_files import SLOT, STATION, TURBULENCE, TYPED, UP, WIND, ground_file, ground_path
 from link_files import data_with, link_file, written
+from made_tables import made, one_line, told
 from microrad.link import Shared
 from microrad.mission.file import MissionError, load_link
-from microrad.mission.ground import GroundPath, geocentric_radius_m
-from microrad.mission.tables.channel import TurbulenceTable
+from microrad.mission.ground import GroundPath, geocentric_radius_m, ground_fits
+from microrad.mission.tables.channel import Channel, TurbulenceTable
+from microrad.mission.tables.orbit import Orbits, OrbitTable
 from microrad.orbit import Epoch, Station
 from microrad.orbit.earth.figure import elevation_rad
 from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit
@@ -414,3 +417,181 @@ def test_turbulence_takes_the_values_of_its_file(tmp_path):
     assert (table.ground_strength, table.wind_rms_m_s, table.corrected_modes) == (1.7e-14, 21.0, 0)
     assert set(TURBULENCE) == {"ground_strength", "wind_rms", "fades", "wander", "tilt", "corrected_modes"}
     assert Shared.of(ground_file(tmp_path).mission).sky.point_ahead_rad == pytest.approx(2.0 * 7500.0 / 299792458.0)
+
+
+def end(kind, **values):
+    return made(OrbitTable, kind=kind, **values)
+
+
+TENERIFE = end("station", latitude_rad=28.3 * deg, longitude_rad=-16.5 * deg, height_m=2393.0, mask_rad=17.0 * deg)
+CIRCLE = end("circular", altitude_m=625e3)
+
+
+def fits(leo, geo, channel, communication=None, beacon=None, answer=None, outage=0.01):
+    """What does not fit of two ends, the air between them, and the distances of the three links."""
+    orbit = None if leo is None else made(Orbits, leo=leo, geo=geo)
+    beams = [
+        None if each is None else SimpleNamespace(distance_m=each or None)
+        for each in (communication or 0.0, beacon, answer)
+    ]
+    return ground_fits(orbit, channel, *beams, SimpleNamespace(outage=outage))
+
+
+ALL_OF_THE_AIR = {
+    "winds of two kinds, and one mode": (
+        lambda: made(TurbulenceTable, wind_rms_m_s=0.0, wind=0, corrected_modes=1).problems(),
+        """
+        wind_rms stands beside the table wind, of which it follows: expected one of the two removed; corrected_modes
+        is 1: piston, or a tilt about one axis: expected 0 without adaptive optics, 3 for tip and tilt, or more
+        """,
+    ),
+    "no wind, and a tilt about one axis": (
+        lambda: made(TurbulenceTable, corrected_modes=2).problems(),
+        """
+        wind_rms is missing, and so is the table wind: expected wind_rms = "21 m/s" would do; corrected_modes is 2:
+        piston, or a tilt about one axis: expected 0 without adaptive optics, 3 for tip and tilt, or more
+        """,
+    ),
+    "a transmission beside all that it follows from": (
+        lambda: made(
+            Channel, zenith_transmission=0.9, aerosol_depth=0.0, angstrom_exponent=0.0, absorption_db=0.0
+        ).problems(),
+        """
+        aerosol_depth stands beside zenith_transmission, which holds it: expected one of the two removed;
+        angstrom_exponent stands beside zenith_transmission, which holds it: expected one of the two removed;
+        absorption stands beside zenith_transmission, which holds it: expected one of the two removed
+        """,
+    ),
+    "no transmission": (
+        lambda: made(Channel).problems(),
+        """
+        zenith_transmission is missing, and so is what it follows from: expected zenith_transmission = 0.9 would do,
+        or aerosol_depth, angstrom_exponent and absorption
+        """,
+    ),
+    "a transmission of haze alone": (
+        lambda: made(Channel, aerosol_depth=0.0).problems(),
+        """
+        angstrom_exponent is missing, and the transmission follows from it: expected angstrom_exponent = 1.3 would
+        do, or zenith_transmission in place of all; absorption is missing, and the transmission follows from it:
+        expected absorption = "0.1 dB" would do, or zenith_transmission in place of all
+        """,
+    ),
+    "a transmission of absorption alone": (
+        lambda: made(Channel, absorption_db=0.0).problems(),
+        """
+        aerosol_depth is missing, and the transmission follows from it: expected aerosol_depth = 0.1 would do, or
+        zenith_transmission in place of all; angstrom_exponent is missing, and the transmission follows from it:
+        expected angstrom_exponent = 1.3 would do, or zenith_transmission in place of all
+        """,
+    ),
+    "a station without air": (
+        lambda: fits(CIRCLE, TENERIFE, None, outage=None),
+        """
+        channel is missing, and orbit.geo is of kind "station": its links cross the air: expected a table such as
+        [channel] with zenith_transmission = 0.9
+        """,
+    ),
+    "a station above a satellite whose air says all of it again": (
+        lambda: fits(
+            CIRCLE,
+            TENERIFE,
+            made(Channel, elevation_rad=0.5, station="leo", height_m=0.0, altitude_m=6e5),
+            communication=9e5,
+            answer=8e5,
+        ),
+        """
+        channel.elevation stands beside orbit.geo.mask, of which it follows: expected this line removed;
+        channel.station stands beside orbit.geo, of which it follows: expected this line removed; channel.height
+        stands beside orbit.geo, of which it follows: expected this line removed; channel.altitude stands beside
+        orbit.leo, of which it follows: expected this line removed; communication.distance stands beside
+        orbit.geo.mask and orbit.leo.altitude, of which a range of 1581 km follows: expected no distance;
+        answer.distance stands beside orbit.geo.mask and orbit.leo.altitude, of which a range of 1581 km follows:
+        expected no distance
+        """,
+    ),
+    "a station below elements without an altitude": (
+        lambda: fits(TENERIFE, end("ephemeris"), made(Channel, turbulence=0), beacon=9e5, outage=None),
+        """
+        channel.altitude is missing, and orbit.geo of kind "ephemeris" does not say it: expected altitude = "500 km"
+        would do: the largest over the station; requirement.outage is missing, and the margin under
+        channel.turbulence is the one that is kept but for it: expected a share of the time, outage = 0.01 for 1 %
+        """,
+    ),
+    "turbulence that reaches beyond a distance, and no outage": (
+        lambda: fits(
+            None,
+            None,
+            made(Channel, turbulence=1, elevation_rad=0.5, station="geo", height_m=0.0),
+            communication=99e3,
+            beacon=1e5,
+            answer=0.0,
+            outage=None,
+        ),
+        """
+        requirement.outage is missing, and the margin under channel.turbulence is the one that is kept but for it:
+        expected a share of the time, outage = 0.01 for 1 %; communication.distance is below 100 km, up to which the
+        air of channel.turbulence reaches: expected distance = "1000 km" would do; answer.distance is missing:
+        expected distance = "42000 km" would do
+        """,
+    ),
+    "turbulence of no place": (
+        lambda: fits(None, None, made(Channel, turbulence=1)),
+        """
+        channel.elevation is missing, and no station in the table orbit says it: expected elevation = "30 deg" would
+        do; channel.station is missing, and no station in the table orbit says it: expected station = "geo" would
+        do; channel.height is missing, and no station in the table orbit says it: expected height = "0 m" would do;
+        communication.distance is missing: expected distance = "42000 km" would do
+        """,
+    ),
+    "haze of no height": (
+        lambda: fits(None, None, made(Channel, aerosol_depth=0.1, elevation_rad=0.5), communication=1e6, answer=0.0),
+        """
+        channel.height is missing, and no station in the table orbit says it: expected height = "0 m" would do;
+        answer.distance is missing: expected distance = "42000 km" would do
+        """,
+    ),
+    "distances beside an elevation and an altitude": (
+        lambda: fits(
+            None,
+            None,
+            made(Channel, elevation_rad=25.0 * deg, altitude_m=7.5e5, height_m=1250.0),
+            communication=1e6,
+            beacon=0.0,
+            answer=2e6,
+        ),
+        """
+        communication.distance stands beside channel.elevation and channel.altitude, of which a range of 1473 km
+        follows: expected no distance; answer.distance stands beside channel.elevation and channel.altitude, of
+        which a range of 1473 km follows: expected no distance
+        """,
+    ),
+    "a slot below the horizon": (
+        lambda: fits(end("geostationary", longitude_rad=150.0 * deg), TENERIFE, made(Channel), beacon=4e7),
+        """
+        orbit.leo.longitude leaves the satellite at an elevation of -62.83 deg over the station, below the horizon:
+        expected a slot that the station sees, or another station
+        """,
+    ),
+    "a slot below the mask": (
+        lambda: fits(TENERIFE, end("geostationary", longitude_rad=-83.5 * deg), made(Channel), beacon=4e7),
+        """
+        orbit.geo.longitude leaves the satellite at an elevation of 11.61 deg over the station, below orbit.leo.mask
+        of 17 deg: expected a slot that the station sees, or another station; beacon.distance stands beside
+        orbit.leo.latitude and orbit.geo.longitude, of which a range of 40420 km follows: expected no distance
+        """,
+    ),
+    "a distance beside a slot": (
+        lambda: fits(TENERIFE, end("geostationary", longitude_rad=-43.5 * deg), made(Channel), communication=4e7),
+        """
+        communication.distance stands beside orbit.leo.latitude and orbit.geo.longitude, of which a range of 37370
+        km follows: expected no distance
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_THE_AIR)
+def test_all_that_does_not_fit_about_the_air_is_told_in_full(what):
+    problems, words = ALL_OF_THE_AIR[what]
+    assert told(problems()) == one_line(words)

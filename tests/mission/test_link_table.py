@@ -2,16 +2,41 @@
 
 import math
 import re
+from types import SimpleNamespace
 
 import pytest
 
 from link_files import GAUSSIAN, OPTIONAL, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
+from made_tables import made, one_line, told
 from microrad.core.units import parse_quantity
 from microrad.link.beams import LitAperture
 from microrad.link.gains import gaussian_beam_gain_db
 from microrad.mission.file import MissionError, load_link
-from microrad.mission.model import LinkMission, Mission, mission_schema
-from microrad.mission.tables.link import Receiver, half_angle_rad, narrowest_half_angle_rad
+from microrad.mission.model import (
+    LinkMission,
+    Mission,
+    _cone_fits,
+    _coupling_fits,
+    _loop_there,
+    _outage_given,
+    _point_ahead_fits,
+    mission_schema,
+)
+from microrad.mission.tables.coupling import Coupling
+from microrad.mission.tables.link import (
+    Beam,
+    BeamShape,
+    Communication,
+    Fading,
+    Receiver,
+    divergence_fits,
+    half_angle_rad,
+    narrowest_half_angle_rad,
+    obscuration_fits,
+    pattern_fits,
+    strehl_fits,
+)
+from microrad.mission.tables.pointing import JitterTable, Pointing
 from shipped import SHIPPED, without_fine_pointing
 
 
@@ -574,3 +599,466 @@ def test_a_phase_error_with_a_floor_above_the_ratio_is_refused_with_the_largest(
     assert parse_quantity(largest, "rad") == pytest.approx(limit, rel=2e-3)
     assert link_file(tmp_path, received_with(name, phase_error=largest)).mission
     assert the_fault(tmp_path, received_with(name, phase_error=f"{limit * 1.01:.4f} rad"))[0] == found
+
+
+ALL_OF_A_LINK = {
+    "a pointing without lines": (
+        lambda: made(Pointing, lines={}).problems(),
+        """lines holds no error: expected a table such as [pointing.lines.body_pointing]""",
+    ),
+    "a jitter about one axis and three": (
+        lambda: made(JitterTable, bias_rad=(1e-6,), rms_rad=(1e-6, 2e-6, 3e-6)).problems(),
+        """
+        bias has 1 items: expected two, for x and y: bias = ["1 urad", "1 urad"]; rms has 3 items: expected two, for
+        x and y: rms = ["1 urad", "1 urad"]
+        """,
+    ),
+    "an even beam with a radius": (
+        lambda: made(BeamShape, profile="uniform", radius_m=0.02, m_squared=1.0).problems(),
+        """
+        radius does not belong to profile = "uniform": expected this line removed, or profile = "gaussian";
+        m_squared does not belong to profile = "uniform": expected this line removed, or profile = "gaussian"
+        """,
+    ),
+    "a gaussian beam of no size": (
+        lambda: made(BeamShape, profile="gaussian").problems(),
+        """
+        radius is missing, and profile = "gaussian" needs it: expected radius = "2 cm" would do; m_squared is
+        missing, and profile = "gaussian" needs it: expected m_squared = 1.1 would do
+        """,
+    ),
+    "a beam of two qualities, the second beyond a quarter wave": (
+        lambda: made(Beam, strehl=0.4, wavefront_error_m=260.5e-9, wavelength_m=1.04e-6).problems(),
+        """
+        strehl stands beside wavefront_error: expected one of the two removed; wavefront_error is above a quarter of
+        the wavelength (260 nm): such a beam has no core to point: expected at most 260 nm
+        """,
+    ),
+    "a beam of no quality": (
+        lambda: made(Beam, wavelength_m=1.04e-6).problems(),
+        """strehl is missing, and so is wavefront_error: expected strehl = 0.4 would do""",
+    ),
+    "a detector of another modulation": (
+        lambda: made(Receiver, modulation="bpsk", detector="apd").problems(),
+        """
+        detector does not receive modulation = "bpsk": expected detector = "homodyne" or detector = "heterodyne"
+        """,
+    ),
+    "a counter of pulse positions without anything": (
+        lambda: made(Receiver, modulation="ppm", detector="photon-counting", bit_error_ratio=1e-6).problems(),
+        """
+        background_power is missing, and modulation = "ppm", detector = "photon-counting" needs it: expected
+        background_power = "0 pW" would do; order is missing, and modulation = "ppm", detector = "photon-counting"
+        needs it: expected order = 16 would do; efficiency is missing, and modulation = "ppm", detector =
+        "photon-counting" needs it: expected efficiency = 0.5 would do; dark_count_rate is missing, and modulation =
+        "ppm", detector = "photon-counting" needs it: expected dark_count_rate = "1000 1/s" would do; code_gain is
+        missing, and so is code: expected code_gain = "0 dB" would do without a code; code_rate is missing, and so
+        is code: expected code_rate = 1.0 would do without a code
+        """,
+    ),
+    "a counter under a sky with what others have": (
+        lambda: made(
+            Receiver,
+            modulation="ook",
+            detector="photon-counting",
+            bit_error_ratio=1e-6,
+            code_gain_db=1.0,
+            code_rate=0.5,
+            background=1,
+            background_power_w=0.0,
+            order=12,
+            extinction_ratio_db=0.0009,
+            efficiency=0.5,
+            dark_current_a=0.0,
+            avalanche_gain=2.0,
+            polarisations=1,
+        ).problems(),
+        """
+        order does not belong to modulation = "ook", detector = "photon-counting": expected this line removed;
+        dark_count_rate is missing, and modulation = "ook", detector = "photon-counting" needs it: expected
+        dark_count_rate = "1000 1/s" would do; dark_current does not belong to modulation = "ook", detector =
+        "photon-counting": expected this line removed; avalanche_gain does not belong to modulation = "ook",
+        detector = "photon-counting": expected this line removed; polarisations does not belong to modulation =
+        "ook", detector = "photon-counting": expected this line removed; background_power stands beside the table
+        background: expected one of the two removed; extinction_ratio is below 0.001 dB, where marks and spaces are
+        alike: expected extinction_ratio = "20 dB" would do; order is no power of two: expected order = 16 would do
+        """,
+    ),
+    "an amplified switch without its filter": (
+        lambda: made(
+            Receiver,
+            modulation="ook",
+            detector="preamplified",
+            bit_error_ratio=1e-6,
+            code_gain_db=1.0,
+            code_rate=0.5,
+            background_power_w=0.0,
+            thermal_noise_a_sqrt_hz=0.0,
+            ionisation_ratio=0.0,
+        ).problems(),
+        """
+        background_power does not belong to modulation = "ook", detector = "preamplified": expected this line
+        removed; extinction_ratio is missing, and modulation = "ook", detector = "preamplified" needs it: expected
+        extinction_ratio = "20 dB" would do; thermal_noise does not belong to modulation = "ook", detector =
+        "preamplified": expected this line removed; ionisation_ratio does not belong to modulation = "ook", detector
+        = "preamplified": expected this line removed; noise_figure is missing, and modulation = "ook", detector =
+        "preamplified" needs it: expected noise_figure = "4 dB" would do; amplifier_gain is missing, and modulation
+        = "ook", detector = "preamplified" needs it: expected amplifier_gain = "35 dB" would do; optical_bandwidth
+        is missing, and modulation = "ook", detector = "preamplified" needs it: expected optical_bandwidth = "20
+        GHz" would do
+        """,
+    ),
+    "an avalanche diode without anything": (
+        lambda: made(Receiver, modulation="ook", detector="apd", bit_error_ratio=1e-6, code="none of these").problems(),
+        """
+        background_power is missing, and modulation = "ook", detector = "apd" needs it: expected background_power =
+        "0 pW" would do; extinction_ratio is missing, and modulation = "ook", detector = "apd" needs it: expected
+        extinction_ratio = "20 dB" would do; efficiency is missing, and modulation = "ook", detector = "apd" needs
+        it: expected efficiency = 0.8 would do; dark_current is missing, and modulation = "ook", detector = "apd"
+        needs it: expected dark_current = "1 nA" would do; thermal_noise is missing, and modulation = "ook",
+        detector = "apd" needs it: expected thermal_noise = "2 pA/sqrt(Hz)" would do; avalanche_gain is missing, and
+        modulation = "ook", detector = "apd" needs it: expected avalanche_gain = 20.0 would do; ionisation_ratio is
+        missing, and modulation = "ook", detector = "apd" needs it: expected ionisation_ratio = 0.2 would do; code
+        is "none of these", which is no code that is known here: expected code = "ccsds-k7-1-2" or code =
+        "dvb-s2-1-4" or code = "dvb-s2-1-3" or code = "dvb-s2-2-5" or code = "dvb-s2-1-2" or code = "dvb-s2-3-5" or
+        code = "dvb-s2-2-3" or code = "dvb-s2-3-4" or code = "dvb-s2-4-5" or code = "dvb-s2-5-6" or code =
+        "dvb-s2-8-9" or code = "dvb-s2-9-10" or code = "scppm-1-2"
+        """,
+    ),
+    "an oscillator without efficiency and with much too large a phase error": (
+        lambda: made(
+            Receiver,
+            modulation="qpsk",
+            detector="homodyne",
+            bit_error_ratio=2e-5,
+            code="sda-1-2",
+            code_gain_db=0.0,
+            code_rate=1.0,
+            phase_error_rad=0.5,
+            noise_figure_db=4.0,
+        ).problems(),
+        """
+        efficiency is missing, and modulation = "qpsk", detector = "homodyne" needs it: expected efficiency = 0.8
+        would do; noise_figure does not belong to modulation = "qpsk", detector = "homodyne": expected this line
+        removed; code_gain stands beside code, which has its own: expected one of the two removed; code_rate stands
+        beside code, which has its own: expected one of the two removed; code is a code for ook (SDA optical
+        communications terminal standard 4.0.0, which prints no threshold), not for qpsk: expected another code, or
+        code_gain and code_rate in its place; phase_error leaves no power that reaches bit_error_ratio = 2e-05 with
+        modulation = "qpsk": expected at most "191 mrad" rms, or another bit_error_ratio
+        """,
+    ),
+    "two phases with the phase error of a lock that is lost": (
+        lambda: made(
+            Receiver,
+            modulation="bpsk",
+            detector="heterodyne",
+            bit_error_ratio=3e-4,
+            efficiency=0.5,
+            code_gain_db=0.0,
+            code_rate=1.0,
+            phase_error_rad=0.9,
+        ).problems(),
+        """
+        phase_error leaves no power that reaches bit_error_ratio = 0.0003 with modulation = "bpsk": expected at most
+        "434.1 mrad" rms, or another bit_error_ratio
+        """,
+    ),
+    "a fading without a series": (
+        lambda: made(
+            Fading, unit="dB", normalised="mean", channel="a", sampling_s=0.1, interleaving="none", interleaver_s=0.01
+        ).problems(),
+        """
+        unit stands without a series: expected this line removed, or series with a file; normalised stands without a
+        series: expected this line removed, or series with a file; channel stands without a series: expected this
+        line removed, or series with a file; sampling stands without a series: expected this line removed, or series
+        with a file; interleaver does not belong to interleaving = "none": expected this line removed, or
+        interleaving = "block"
+        """,
+    ),
+    "a series that says nothing of itself": (
+        lambda: made(Fading, series="a.csv", interleaving="convolutional").problems(),
+        """
+        unit is missing, and series needs it: expected unit = "linear" would do; normalised is missing, and series
+        needs it: expected normalised = "mean" would do; interleaver is missing, and interleaving = "convolutional"
+        needs it: expected interleaver = "10 ms" would do
+        """,
+    ),
+    "a link with two receivers, and a second ratio for its fades": (
+        lambda: made(
+            Communication,
+            strehl=0.4,
+            wavelength_m=1e-6,
+            receiver_sensitivity_photon_bit=50.0,
+            receiver=SimpleNamespace(modulation="ook", extinction_ratio_db=0.0, code_gain_db=90.0),
+            fading=SimpleNamespace(bit_error_ratio=1e-6),
+        ).problems(),
+        """
+        receiver_sensitivity stands beside the table receiver: expected one of the two removed;
+        fading.bit_error_ratio stands beside that of the table receiver: expected this line removed; fading.code is
+        of BPSK, and the receiver has modulation = "ook": expected modulation = "bpsk", or a measured
+        receiver_sensitivity
+        """,
+    ),
+    "a link with no receiver, and no ratio for its fades": (
+        lambda: made(
+            Communication, strehl=0.4, wavelength_m=1e-6, fading=SimpleNamespace(bit_error_ratio=None)
+        ).problems(),
+        """
+        receiver_sensitivity is missing, and so is the table receiver: expected receiver_sensitivity = "100
+        photon/bit" would do, or a table receiver; fading.bit_error_ratio is missing, and so is the table receiver,
+        which has one: expected bit_error_ratio = 1e-6 would do
+        """,
+    ),
+    "a link with light that has no core to couple": (
+        lambda: made(
+            Communication,
+            strehl=0.4,
+            wavelength_m=1.54e-6,
+            receiver_sensitivity_photon_bit=50.0,
+            coupling=made(Coupling, defocus_m=0.77e-6, astigmatism_m=-0.78e-6, coma_m=0.8e-6, spherical_m=-0.76e-6),
+        ).problems(),
+        """
+        coupling.astigmatism is above half the wavelength (770 nm): such light has no core to couple: expected at
+        most 770 nm; coupling.coma is above half the wavelength (770 nm): such light has no core to couple: expected
+        at most 770 nm
+        """,
+    ),
+    "a code that gains more than any": (
+        lambda: made(
+            Communication,
+            strehl=0.4,
+            wavelength_m=1e-6,
+            data_rate_bit_s=622.08e6,
+            receiver=made(
+                Receiver,
+                modulation="bpsk",
+                detector="homodyne",
+                bit_error_ratio=2.5e-7,
+                code_gain_db=11.375,
+                code_rate=0.4375,
+            ),
+        ).problems(),
+        """
+        receiver.code_gain is more than any code can gain: 11.1 dB at code_rate = 0.4375 and bit_error_ratio =
+        2.5e-07, where bpsk with homodyne is at its capacity: expected at most "11.09 dB" at code_rate = 0.4375: the
+        net gain, power per bit
+        """,
+    ),
+    "a fibre of one mode with what the others have": (
+        lambda: made(
+            Coupling,
+            into="single-mode fibre",
+            mode_radius_m=5e-6,
+            core_radius_m=1e-5,
+            detector_radius_m=1e-5,
+            numerical_aperture=0.1,
+        ).problems(),
+        """
+        core_radius does not belong to into = "single-mode fibre": expected this line removed, or into = "multi-mode
+        fibre"; numerical_aperture does not belong to into = "single-mode fibre": expected this line removed, or
+        into = "multi-mode fibre"; detector_radius does not belong to into = "single-mode fibre": expected this line
+        removed, or into = "detector"; focal_length is missing, and into = "single-mode fibre" needs it: expected
+        focal_length = "50 cm" would do
+        """,
+    ),
+    "a fibre of one mode without it, off its place": (
+        lambda: made(Coupling, into="single-mode fibre", lateral_error_m=1e-6).problems(),
+        """
+        mode_radius is missing, and into = "single-mode fibre" needs it: expected mode_radius = "best" would do;
+        focal_length is missing, and into = "single-mode fibre" needs it: expected focal_length = "50 cm" would do
+        """,
+    ),
+    "a fibre of one mode, turned": (
+        lambda: made(
+            Coupling,
+            into="single-mode fibre",
+            mode_radius_m=math.nan,
+            angular_error_rad=1e-3,
+            twin=True,
+            pointing_error_rad=0.0,
+        ).problems(),
+        """
+        focal_length is missing, and into = "single-mode fibre" needs it: expected focal_length = "50 cm" would do;
+        pointing_error stands beside twin: both say how the receiver points: expected one of the two
+        """,
+    ),
+    "a fibre of many modes with a mode": (
+        lambda: made(
+            Coupling,
+            into="multi-mode fibre",
+            mode_radius_m=5e-6,
+            angular_error_rad=0.0,
+            coma_m=0.0,
+            jitter=0,
+            pointing_error_rad=0.0,
+        ).problems(),
+        """
+        mode_radius does not belong to into = "multi-mode fibre": expected this line removed, or into = "single-mode
+        fibre"; core_radius is missing, and into = "multi-mode fibre" needs it: expected core_radius = "25 um" would
+        do; numerical_aperture is missing, and into = "multi-mode fibre" needs it: expected numerical_aperture = 0.2
+        would do; focal_length is missing, and into = "multi-mode fibre" needs it: expected focal_length = "50 cm"
+        would do; angular_error does not belong to into = "multi-mode fibre": expected this line removed, or into =
+        "single-mode fibre"; pointing_error stands beside jitter: both say how the receiver points: expected one of
+        the two
+        """,
+    ),
+    "a detector with a twin and a jitter": (
+        lambda: made(
+            Coupling, into="detector", numerical_aperture=0.1, focal_length_m=0.5, twin=True, jitter=0
+        ).problems(),
+        """
+        numerical_aperture does not belong to into = "detector": expected this line removed, or into = "multi-mode
+        fibre"; detector_radius is missing, and into = "detector" needs it: expected detector_radius = "50 um" would
+        do; jitter stands beside twin: both say how the receiver points: expected one of the two
+        """,
+    ),
+    "a strehl without a convention": (
+        lambda: strehl_fits("answer")(SimpleNamespace(strehl="unused"), SimpleNamespace(strehl=0.4)),
+        """
+        conventions.strehl is missing, and answer.strehl is read by it: expected strehl = "ratio" for a number up to
+        1, or "decibel"
+        """,
+    ),
+    "a strehl ratio above one": (
+        lambda: strehl_fits("beacon")(SimpleNamespace(strehl="ratio"), SimpleNamespace(strehl=1.0625)),
+        """
+        beacon.strehl is no ratio, but conventions.strehl = "ratio" (1.0625): expected above 0 and at most 1, or
+        conventions.strehl = "decibel"
+        """,
+    ),
+    "a divergence without a convention": (
+        lambda: divergence_fits("answer", "geo")(
+            SimpleNamespace(divergence="unused"), SimpleNamespace(), SimpleNamespace()
+        ),
+        """
+        conventions.divergence is missing, and answer.divergence is read by it: expected divergence = "full-1/e2"
+        for the full angle at 1/e2, or "half-1/e2"
+        """,
+    ),
+    "a full angle below diffraction": (
+        lambda: divergence_fits("beacon", "leo")(
+            SimpleNamespace(divergence="full-1/e2"),
+            SimpleNamespace(leo_aperture_m=0.05, geo_aperture_m=5.0),
+            SimpleNamespace(wavelength_m=8e-7, divergence_rad=2.5e-5),
+        ),
+        """
+        beacon.divergence is below diffraction at leo_aperture = 50 mm, which leaves no less than 28.84 µrad (full
+        angle at 1/e2): expected at least "28.84 µrad", or a larger aperture
+        """,
+    ),
+    "a half angle below diffraction": (
+        lambda: divergence_fits("answer", "geo")(
+            SimpleNamespace(divergence="half-1/e2"),
+            SimpleNamespace(leo_aperture_m=50.0, geo_aperture_m=0.25),
+            SimpleNamespace(wavelength_m=1.06e-6, divergence_rad=3.5e-6),
+        ),
+        """
+        answer.divergence is below diffraction at geo_aperture = 250 mm, which leaves no less than 3.821 µrad (half
+        angle at 1/e2): expected at least "3.821 µrad", or a larger aperture
+        """,
+    ),
+    "a pattern of no beam": (
+        lambda: pattern_fits(SimpleNamespace(pointing_loss="pattern"), SimpleNamespace(beam=None)),
+        """
+        conventions.pointing_loss needs the table communication.beam, which is missing: expected pointing_loss =
+        "gaussian", or a table [communication.beam]
+        """,
+    ),
+    "a beam without a pattern": (
+        lambda: pattern_fits(SimpleNamespace(pointing_loss="gain"), SimpleNamespace(beam=0)),
+        """
+        conventions.pointing_loss does not take communication.beam into account ("gain"): expected pointing_loss =
+        "pattern"
+        """,
+    ),
+    "a beam within its obscuration": (
+        lambda: obscuration_fits(
+            SimpleNamespace(leo_obscuration=0.4375, leo_aperture_m=0.25),
+            SimpleNamespace(beam=SimpleNamespace(radius_m=0.03)),
+        ),
+        """
+        communication.beam.radius leaves less than 1 % of the beam beside leo_obscuration = 0.4375: expected at
+        least "36.08 mm", or a smaller obscuration
+        """,
+    ),
+    "a beacon without pointing errors": (
+        lambda: _cone_fits(None, SimpleNamespace()),
+        """
+        pointing is missing, and the cone of the beacon is judged by its errors: expected the table [pointing] with
+        its lines, or no beacon
+        """,
+    ),
+    "a jitter without an outage": (
+        lambda: _outage_given(SimpleNamespace(), SimpleNamespace(outage=None)),
+        """
+        requirement.outage is missing, and the margin under the table jitter is the one that is kept but for it:
+        expected a share of the time, outage = 0.003 for 0.3 %
+        """,
+    ),
+    "a cone within the obscuration, and no outage for a twin": (
+        lambda: _coupling_fits(
+            SimpleNamespace(geo_obscuration=0.5, geo_aperture_m=0.25),
+            SimpleNamespace(
+                wavelength_m=1e-6, coupling=made(Coupling, numerical_aperture=0.125, focal_length_m=0.4375, twin=True)
+            ),
+            SimpleNamespace(outage=None),
+        ),
+        """
+        communication.coupling.numerical_aperture leaves 110.2 mm of the aperture, no more than
+        terminals.geo_obscuration stops: expected a larger one, or a longer focal_length; requirement.outage is
+        missing, and the margin under the receiver's jitter is the one that is kept but for it: expected a share of
+        the time, outage = 0.003 for 0.3 %
+        """,
+    ),
+    "a fibre that is turned too far for its mode": (
+        lambda: _coupling_fits(
+            SimpleNamespace(geo_obscuration=None, geo_aperture_m=0.25),
+            SimpleNamespace(
+                wavelength_m=1.55e-6,
+                coupling=made(Coupling, angular_error_rad=0.7, mode_radius_m=5e-6, focal_length_m=0.75),
+            ),
+            SimpleNamespace(outage=None),
+        ),
+        """
+        communication.coupling.angular_error turns the fibre's mode out of the aperture: beyond 668.2 mrad it takes
+        no light to speak of: expected at most 668.2 mrad
+        """,
+    ),
+    "a fibre that is turned too far for the best mode": (
+        lambda: _coupling_fits(
+            SimpleNamespace(geo_obscuration=None, geo_aperture_m=0.25),
+            SimpleNamespace(
+                wavelength_m=1.55e-6,
+                coupling=made(Coupling, angular_error_rad=0.96, mode_radius_m=math.nan, focal_length_m=0.75),
+            ),
+            SimpleNamespace(outage=0.01),
+        ),
+        """
+        communication.coupling.angular_error turns the fibre's mode out of the aperture: beyond 871.7 mrad it takes
+        no light to speak of: expected at most 871.7 mrad
+        """,
+    ),
+    "two point-aheads": (
+        lambda: _point_ahead_fits(
+            SimpleNamespace(transverse_velocity_m_s=8125.0),
+            SimpleNamespace(reference=SimpleNamespace(point_ahead_rad=53e-6)),
+        ),
+        """
+        fine_pointing.reference.point_ahead is not 2 v / c of point_ahead.transverse_velocity (54.2 µrad): expected
+        point_ahead = "54.2 µrad" would do
+        """,
+    ),
+    "a budget of a loop that is not there": (
+        lambda: _loop_there(SimpleNamespace(with_loop=True), None),
+        """
+        error_budget.with_loop is true, and the mission has no table fine_pointing: expected the table
+        [fine_pointing], which microrad init writes, or false
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_LINK)
+def test_all_that_does_not_fit_in_a_table_of_a_link_is_told_in_full(what):
+    problems, words = ALL_OF_A_LINK[what]
+    assert told(problems()) == one_line(words)

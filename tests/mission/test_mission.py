@@ -11,6 +11,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pydantic
@@ -18,15 +19,36 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from made_tables import made, one_line, told
 from microrad.core import lti
 from microrad.core.units import UnitError
 from microrad.mirror import model as mirror
 from microrad.mission import toml
-from microrad.mission.fields import Quantity
+from microrad.mission.fields import ProblemsError, Quantity
 from microrad.mission.file import MissionError, assumptions, load_coupled_mirror, load_mirror, load_mission
-from microrad.mission.model import Mission, Source, mission_schema, source_text
+from microrad.mission.model import (
+    Amplifier,
+    Control,
+    Mission,
+    Source,
+    _bias_fits,
+    _frequencies_fit,
+    mission_schema,
+    source_text,
+)
+from microrad.mission.tables import mirror as mirror_table
 from microrad.mission.tables.link import half_angle_rad
-from microrad.mission.tables.mirror import BoucWenTable
+from microrad.mission.tables.mirror import (
+    BoucWenTable,
+    Comparison,
+    CreepTable,
+    KeyList,
+    LinearPart,
+    Mirror,
+    PrandtlIshlinskiiTable,
+    Uncertainty,
+    place,
+)
 from microrad.mission.toml import Document, scan
 from microrad.studio.draft.draft import Draft
 from places import ROOT
@@ -1182,3 +1204,300 @@ def test_a_statement_is_too_large_beyond_its_limits_and_not_at_them(changes, rea
     statement = replace(toml.Statement("key", "key", 1, 1, "1"), **changes)
     found = toml._oversize(statement)
     assert (None if found is None else found[0]) == reason
+
+
+BAND = {"excited_from_hz": 2.0, "normalise_at_hz": 3.0, "excited_to_hz": 4500.0}
+
+
+def refused(call, *given):
+    """The problems that a call raises."""
+    with pytest.raises(ProblemsError) as error:
+        call(*given)
+    return error.value.problems
+
+
+def known():
+    """A mirror with three tables that parameters stand in."""
+    linear = made(
+        LinearPart, poles_hz=(500.0, 900.0, 1e3), pole_dampings=(0.5, 1.0, 0.25), zeros_hz=(0.0,), zero_dampings=(-1.0,)
+    )
+    plays = made(PrandtlIshlinskiiTable, thresholds_v=(0.0, 1.0), weights_rad_v=(1e-3, 2e-3), widening_s=0.0)
+    creep = made(CreepTable, time_constants_s=(1.0, 3.0), weights_rad_v=(1e-4, 0.0))
+    return made(Mirror, linear=linear, prandtl_ishlinskii=plays, creep=creep)
+
+
+ALL_OF_A_MIRROR = {
+    "an amplifier that falls": (
+        lambda: made(Amplifier, output_min_v=-2.5, output_max_v=-2.5).problems(),
+        """output_max is not above output_min (-2.5 V): expected a voltage above -2.5 V""",
+    ),
+    "a clock of the control": (
+        lambda: made(Control, rate_hz=4000.0, delay_s=33e-6, plant_step_s=10e-6).problems(),
+        """delay is no whole number of plant_step: expected delay = "30 µs" would do""",
+    ),
+    "a bias out of an amplifiers reach": (
+        lambda: _bias_fits(
+            SimpleNamespace(bias_v=61.0), SimpleNamespace(output_min_v=-30.0, output_max_v=150.0, gain=2.5)
+        ),
+        """
+        mirror.bias is outside amplifier.output_min to amplifier.output_max divided by amplifier.gain: expected -12
+        V to 60 V
+        """,
+    ),
+    "sines too slow and too fast": (
+        lambda: _frequencies_fit(
+            SimpleNamespace(rate_hz=2e4),
+            SimpleNamespace(
+                pid_frequencies_hz=(1e-9, 3.0), inverse_frequencies_hz=(1.0, 10000.0), loop_frequencies_hz=(2e-9, 12e3)
+            ),
+        ),
+        """
+        scenario.pid_frequencies begins at 1e-06 mHz, a period of over 2000000 control samples: expected frequencies
+        of at least 10 mHz; scenario.inverse_frequencies reaches 10 kHz, but half of control.rate is 10 kHz:
+        expected frequencies below 10 kHz; scenario.loop_frequencies begins at 2e-06 mHz, a period of over 2000000
+        control samples: expected frequencies of at least 10 mHz; scenario.loop_frequencies reaches 12 kHz, but half
+        of control.rate is 10 kHz: expected frequencies below 10 kHz
+        """,
+    ),
+    "coefficients with what roots have, of an integrator": (
+        lambda: made(
+            LinearPart,
+            numerator=(0.0, 0.0),
+            denominator=(0.0, 2.0, 0.0),
+            zeros_hz=(1.0,),
+            pole_dampings=(1.0,),
+            zero_dampings=(),
+            excited_from_hz=5.0,
+            excited_to_hz=5.0,
+        ).problems(),
+        """
+        zeros stands without poles: expected the key poles, or this one removed: poles = ["5 kHz"]; pole_dampings
+        stands without poles: expected the key poles, or this one removed: poles = ["5 kHz"]; zero_dampings stands
+        without poles: expected the key poles, or this one removed: poles = ["5 kHz"]; denominator ends with 0,
+        which makes the linear part an integrator: expected a last coefficient other than 0; model drift apart from
+        the mirror; denominator begins with 0: expected the highest power of s first, with a factor other than 0;
+        numerator is zero throughout: expected at least one coefficient other than 0; excited_to is not above
+        excited_from: expected a band that goes up
+        """,
+    ),
+    "coefficients of as high an order above": (
+        lambda: made(
+            LinearPart,
+            numerator=(0.0, 1.0, 2.0, 3.0),
+            denominator=(1.0, 2.0, 3.0),
+            excited_from_hz=2.0,
+            normalise_at_hz=4501.0,
+            excited_to_hz=4500.0,
+        ).problems(),
+        """
+        numerator has no lower order than denominator: expected fewer coefficients than denominator has;
+        normalise_at is outside excited_from to excited_to (2 Hz to 4.5 kHz): expected 2 Hz to 4.5 kHz
+        """,
+    ),
+    "a factor that is nothing": (
+        lambda: made(LinearPart, numerator=(2.0,), denominator=(-1.5e-148, -7.5e2, 1.0), **BAND).problems(),
+        """
+        denominator begins with a factor that is nothing beside others: -1.5e-148 of 750: expected coefficients of
+        at most 1e+150 times the first one
+        """,
+    ),
+    "no numerator": (
+        lambda: made(LinearPart, denominator=(1.0, 1.0), **BAND).problems(),
+        """has no numerator: expected poles and pole_dampings, or numerator and denominator""",
+    ),
+    "neither form": (
+        lambda: made(LinearPart, numerator=(1.0, 1.0), **BAND).problems(),
+        """
+        has neither poles nor numerator and denominator: expected poles and pole_dampings, or numerator and
+        denominator
+        """,
+    ),
+    "roots beside coefficients, unstable and too many": (
+        lambda: made(
+            LinearPart,
+            numerator=(1.0,),
+            denominator=(1.0,),
+            poles_hz=(1.0, 2.0, 3.0),
+            pole_dampings=(0.5, 0.0),
+            zeros_hz=(1.0, 2.0),
+            zero_dampings=(-1.0, 0.5, 1.0),
+            **BAND,
+        ).problems(),
+        """
+        numerator stands beside poles: expected the transfer function in one form only; denominator stands beside
+        poles: expected the transfer function in one form only; pole_dampings has 2 items where poles has 3:
+        expected one damping for each of poles; zero_dampings has 3 items where zeros has 2: expected one damping
+        for each of zeros; pole_dampings has an unstable pole: expected dampings above 0; zeros makes 4 zeros over 4
+        poles: expected fewer zeros than poles, pairs counted twice
+        """,
+    ),
+    "the asymmetry of both kinds": (
+        lambda: made(BoucWenTable, alpha_1_v=1.125, beta_1_v=-0.75, gamma_1_v=0.5, eta_1_v=0.125).problems(),
+        """
+        alpha is not above the size of what beta, gamma and eta take off it (1.375 1/V), so h would grow without
+        bound: expected above 1.375 1/V
+        """,
+    ),
+    "the size of beta": (
+        lambda: made(BoucWenTable, alpha_1_v=0.75, beta_1_v=-0.75, gamma_1_v=0.0, eta_1_v=0.0).problems(),
+        """
+        alpha is not above the size of beta (0.75 1/V), so h would grow without bound: expected above 0.75 1/V
+        """,
+    ),
+    "plays without a first one, of no weight": (
+        lambda: made(PrandtlIshlinskiiTable, thresholds_v=(0.5, 1.0), weights_rad_v=(0.0, 0.0, 0.0)).problems(),
+        """
+        thresholds does not begin at 0 V: expected a first threshold of "0 V"; weights has 3 items where thresholds
+        has 2: expected one weight for each threshold; weights is zero throughout: expected at least one weight
+        above 0
+        """,
+    ),
+    "creep of one weight": (
+        lambda: made(CreepTable, time_constants_s=(0.5, 1.0, 2.0), weights_rad_v=(1e-6,)).problems(),
+        """weights has 1 items where time_constants has 3: expected one weight for each time constant""",
+    ),
+    "a comparison with two models": (
+        lambda: made(Comparison, bouc_wen=0, prandtl_ishlinskii=0).problems(),
+        """has two hysteresis models: expected exactly one of the tables bouc_wen and prandtl_ishlinskii""",
+    ),
+    "an uncertainty that counts otherwise": (
+        lambda: made(
+            Uncertainty, parameters=("a", "b", "c"), standard_errors=(0.1, 0.2), correlation=(0.5, 0.25)
+        ).problems(),
+        """
+        standard_errors has 2 items where parameters has 3: expected one standard error for each parameter;
+        correlation has 2 items where 3 parameters have 3 pairs: expected 3 numbers, the lower triangle without the
+        diagonal, or none
+        """,
+    ),
+    "correlations that cannot be": (
+        lambda: made(
+            Uncertainty, parameters=("a", "b", "c"), standard_errors=(0.1, 0.2, 0.3), correlation=(0.875, 0.75, -0.5)
+        ).problems(),
+        """
+        correlation is not positive semidefinite: its smallest eigenvalue is -0.428: expected correlations that can
+        be together, as the fit gave them
+        """,
+    ),
+    "keys that are no text": (
+        lambda: refused(KeyList(None).read, ["a", 2]),
+        """
+        is not a list of keys in quotes: expected a list of keys inside the mirror, items of lists counted from 1:
+        ["bouc_wen.d1", "linear.poles.1"]
+        """,
+    ),
+    "more keys than there may be": (
+        lambda: refused(KeyList(None, most=2).read, ["a", "b", "c"]),
+        """is a list of 3 items: expected at most 2 items""",
+    ),
+    "a table that is not there": (
+        lambda: refused(place, known(), "bouc_wen.d1"),
+        """
+        uncertainty.parameters has "bouc_wen.d1", which is in no table of this mirror: expected a key of linear,
+        prandtl_ishlinskii, creep
+        """,
+    ),
+    "a key of another form": (
+        lambda: refused(place, known(), "linear.numerator"),
+        """
+        uncertainty.parameters has "linear.numerator", which is no parameter of this mirror's linear: expected one
+        of poles, pole_dampings, zeros, zero_dampings
+        """,
+    ),
+    "a value of nothing": (
+        lambda: refused(place, known(), "prandtl_ishlinskii.widening"),
+        """
+        uncertainty.parameters has "prandtl_ishlinskii.widening", which is 0 in this mirror, and nothing is relative
+        to 0: expected a parameter that is not held at 0
+        """,
+    ),
+    "an item of nothing": (
+        lambda: refused(place, known(), "creep.weights.2"),
+        """
+        uncertainty.parameters has "creep.weights.2", which is 0 in this mirror, and nothing is relative to 0:
+        expected a parameter that is not held at 0
+        """,
+    ),
+    "an item of a single value": (
+        lambda: refused(place, known(), "prandtl_ishlinskii.widening.1"),
+        """
+        uncertainty.parameters has "prandtl_ishlinskii.widening.1", which counts the items of a single value:
+        expected the key without a number
+        """,
+    ),
+    "an item beyond the list": (
+        lambda: refused(place, known(), "linear.poles.4"),
+        """
+        uncertainty.parameters has "linear.poles.4", which names no item of a list of 3: expected a number from 1 to
+        3
+        """,
+    ),
+    "the damping of a real pole": (
+        lambda: refused(place, known(), "linear.pole_dampings.2"),
+        """
+        uncertainty.parameters has "linear.pole_dampings.2", which is the damping of a real root, 1 by definition:
+        expected the damping of a pair of roots
+        """,
+    ),
+    "the dampings of all poles, one of them real": (
+        lambda: refused(place, known(), "linear.pole_dampings"),
+        """
+        uncertainty.parameters has "linear.pole_dampings", which is the damping of a real root, 1 by definition:
+        expected the damping of a pair of roots
+        """,
+    ),
+    "the dampings of all zeros": (
+        lambda: refused(place, known(), "linear.zero_dampings"),
+        """
+        uncertainty.parameters has "linear.zero_dampings", which is the damping of a real root, 1 by definition:
+        expected the damping of a pair of roots
+        """,
+    ),
+    "values named twice": (
+        lambda: mirror_table._uncertainty_problems(
+            known(),
+            SimpleNamespace(
+                parameters=(
+                    "linear.poles.1",
+                    "linear.poles.3",
+                    "linear.poles.1",
+                    "creep.weights",
+                    "creep.weights.1",
+                    "creep.time_constants.2",
+                    "creep.time_constants",
+                    "x",
+                )
+            ),
+        ),
+        """
+        uncertainty.parameters has "linear.poles.1", which stands twice, or beside its whole list: expected each
+        value once; uncertainty.parameters has "creep.weights.1", which stands twice, or beside its whole list:
+        expected each value once; uncertainty.parameters has "creep.time_constants", which stands twice, or beside
+        its whole list: expected each value once; uncertainty.parameters has "x", which is in no table of this
+        mirror: expected a key of linear, prandtl_ishlinskii, creep
+        """,
+    ),
+    "a mirror of no model and no range": (
+        lambda: made(Mirror, composition="additive", bias_v=1.0, drive_min_v=12.5, drive_max_v=12.5).problems(),
+        """
+        has no hysteresis model: expected exactly one of the tables bouc_wen and prandtl_ishlinskii; drive_max is
+        not above drive_min (12.5 V): expected a voltage above 12.5 V; composition is "additive" but the table
+        linear is missing: expected a table linear, or composition = "static"
+        """,
+    ),
+    "a still mirror with dynamics, its bias out of range": (
+        lambda: made(
+            Mirror, composition="static", linear=0, bouc_wen=0, bias_v=13.0, drive_min_v=-2.5, drive_max_v=12.5
+        ).problems(),
+        """
+        bias is outside drive_min to drive_max (-2.5 V to 12.5 V): expected -2.5 V to 12.5 V; linear does not belong
+        to composition = "static": expected the table linear removed, or composition = "cascade"
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_MIRROR)
+def test_all_that_does_not_fit_in_a_table_of_the_mirror_is_told_in_full(what):
+    problems, words = ALL_OF_A_MIRROR[what]
+    assert told(problems()) == one_line(words)

@@ -1,13 +1,16 @@
 """Lists of error sources as tables of a spreadsheet: what is read, and every refusal in a line."""
 
 import re
+from types import SimpleNamespace
 from zipfile import ZIP_DEFLATED, ZipFile
 
 import pytest
 
 from budget_files import HEADING, ROWS
+from made_tables import made, one_line, told
 from microrad.mission import source_list
 from microrad.mission.source_list import COLUMNS, SourceListError, read_sources
+from microrad.mission.tables.error_budget import BudgetRequirement, BudgetSource, ErrorBudget
 
 
 def listed(folder, *rows, head=HEADING, name="errors.csv"):
@@ -144,3 +147,125 @@ def test_a_workbook_that_unpacks_to_more_than_memory_has_is_refused(tmp_path):
 def test_a_cell_that_is_empty_or_too_much_moves_no_other(tmp_path, row, said):
     with pytest.raises(SourceListError, match=re.escape(said)):
         read_sources(listed(tmp_path, row))
+
+
+ALL_OF_A_BUDGET = {
+    "a drift with what a transient has": (
+        lambda: made(BudgetSource, kind="drift", statistic="fixed", gains=(), size_rad=0.0, decay_s=3.0).problems(),
+        """
+        size does not belong to class = "drift": expected this line removed; rate is missing, and class = "drift"
+        needs it: expected rate = "1 nrad/s" would do; period is missing, and class = "drift" needs it: expected
+        period = "6 h" would do; decay does not belong to class = "drift": expected this line removed; gains has 0
+        items: expected one for each axis: gains = [1.0, 1.0]
+        """,
+    ),
+    "a process of three sigmas about four axes": (
+        lambda: made(
+            BudgetSource, kind="process", statistic="3-sigma", gains=(1.0, 2.0, 3.0, 4.0), rate_rad_s=0.0
+        ).problems(),
+        """
+        size is missing, and class = "process" needs it: expected size = "1 urad" would do; rate does not belong to
+        class = "process": expected this line removed; corner is missing, and class = "process" needs it: expected
+        corner = "1 Hz" would do; gains has 4 items: expected one for each axis: gains = [1.0, 1.0]; statistic does
+        not belong to a process: expected its rms: statistic = "1-sigma"
+        """,
+    ),
+    "a random error that is fixed": (
+        lambda: made(
+            BudgetSource, kind="random", statistic="fixed", gains=(0.0,), size_rad=1.0, frequency_hz=2.0
+        ).problems(),
+        """
+        frequency does not belong to class = "random": expected this line removed; statistic does not belong to a
+        random error: expected "1-sigma", "2-sigma", "3-sigma" or "bound"
+        """,
+    ),
+    "an error of each observation that is fixed": (
+        lambda: made(BudgetSource, kind="per-observation", statistic="fixed", gains=(0.0,), period_s=2.0).problems(),
+        """
+        size is missing, and class = "per-observation" needs it: expected size = "1 urad" would do; period does not
+        belong to class = "per-observation": expected this line removed; statistic leaves no other one in the next
+        observation: expected class = "constant", or how it is spread
+        """,
+    ),
+    "a transient and a sinusoid without their keys": (
+        lambda: [
+            *made(BudgetSource, kind="transient", statistic="bound", gains=(0.0,)).problems(),
+            *made(BudgetSource, kind="periodic", statistic="bound", gains=(0.0,)).problems(),
+        ],
+        """
+        size is missing, and class = "transient" needs it: expected size = "1 urad" would do; period is missing, and
+        class = "transient" needs it: expected period = "95 min" would do; decay is missing, and class = "transient"
+        needs it: expected decay = "10 s" would do; size is missing, and class = "periodic" needs it: expected size
+        = "1 urad" would do; frequency is missing, and class = "periodic" needs it: expected frequency = "0.2 mHz"
+        would do
+        """,
+    ),
+    "a difference without its times": (
+        lambda: made(BudgetRequirement, index="PRE").problems(),
+        """
+        window is missing, and index = "PRE" needs it: expected window = "10 ms" would do; spacing is missing, and
+        index = "PRE" needs it: expected spacing = "1 min" would do; observation is missing, and index = "PRE" needs
+        it: expected observation = "95 min" would do
+        """,
+    ),
+    "a knowledge with times": (
+        lambda: made(BudgetRequirement, index="AKE", window_s=1.0, observation_s=2.0).problems(),
+        """
+        window does not belong to index = "AKE": expected this line removed; observation does not belong to index =
+        "AKE": expected this line removed
+        """,
+    ),
+    "a budget of nothing": (
+        lambda: made(ErrorBudget, with_loop=False, sources={}, requirements={}).problems(),
+        """
+        sources holds no source: expected a table such as [error_budget.sources.alignment]; requirements holds none:
+        expected a table such as [error_budget.requirements.code_word]
+        """,
+    ),
+    "a budget of a loop about three axes": (
+        lambda: made(
+            ErrorBudget,
+            with_loop=True,
+            sources={
+                "a": SimpleNamespace(gains=(1, 2, 3)),
+                "b": SimpleNamespace(gains=(1,)),
+                "c": SimpleNamespace(gains=(1, 2)),
+            },
+            requirements={
+                "p": SimpleNamespace(index="APE", axes="z"),
+                "q": SimpleNamespace(index="RKE", axes="x"),
+                "r": SimpleNamespace(index="MKE", axes="y"),
+            },
+        ).problems(),
+        """
+        sources.b.gains has 1 items, and others have 3: expected as many each; sources.c.gains has 2 items, and
+        others have 3: expected as many each; requirements.q.index is of what is known, and the loop leaves errors
+        of the pointing: expected with_loop = false, and sources of knowledge alone; with_loop has two axes, and the
+        sources have 3: expected gains for x and y
+        """,
+    ),
+    "a budget about one axis": (
+        lambda: made(
+            ErrorBudget,
+            with_loop=False,
+            sources={"a": SimpleNamespace(gains=(1,))},
+            requirements={
+                "p": SimpleNamespace(index="AKE", axes="x"),
+                "q": SimpleNamespace(index="RKE", axes="radial"),
+                "r": SimpleNamespace(index="MKE", axes="y"),
+                "s": SimpleNamespace(index="MKE", axes="z"),
+            },
+        ).problems(),
+        """
+        requirements.q.axes needs 2 axes, and the sources have 1: expected more gains; requirements.r.axes needs 2
+        axes, and the sources have 1: expected more gains; requirements.s.axes needs 3 axes, and the sources have 1:
+        expected more gains
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_BUDGET)
+def test_all_that_does_not_fit_in_a_budget_is_told_in_full(what):
+    problems, words = ALL_OF_A_BUDGET[what]
+    assert told(problems()) == one_line(words)
