@@ -9,9 +9,10 @@ import re
 import subprocess
 import sys
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Annotated
 
 import numpy as np
 import pydantic
@@ -24,7 +25,7 @@ from microrad.core import lti
 from microrad.core.units import UnitError
 from microrad.mirror import model as mirror
 from microrad.mission import toml
-from microrad.mission.fields import ProblemsError, Quantity
+from microrad.mission.fields import Bounded, Monthly, OrWord, ProblemsError, Quantity, Several, Share, Switch, Whole
 from microrad.mission.file import MissionError, assumptions, load_coupled_mirror, load_mirror, load_mission
 from microrad.mission.model import (
     Amplifier,
@@ -49,7 +50,8 @@ from microrad.mission.tables.mirror import (
     Uncertainty,
     place,
 )
-from microrad.mission.toml import Document, scan
+from microrad.mission.tables.orbit import UtcEpoch
+from microrad.mission.toml import Document, Fault, UnreadableError, scan, shown, value_of
 from microrad.studio.draft.draft import Draft
 from places import ROOT
 from shipped import DEFAULT, SHIPPED
@@ -1501,3 +1503,616 @@ ALL_OF_A_MIRROR = {
 def test_all_that_does_not_fit_in_a_table_of_the_mirror_is_told_in_full(what):
     problems, words = ALL_OF_A_MIRROR[what]
     assert told(problems()) == one_line(words)
+
+
+def answered(call, *given, **named):
+    """What a call gives, or the error that it raises, in words."""
+    try:
+        return repr(call(*given, **named))
+    except ValueError as error:
+        return f"{type(error).__name__}: {error}"
+
+
+@dataclass(frozen=True, slots=True)
+class Held(Bounded):
+    """A record of three bounded numbers, one of them with a reason."""
+
+    name: str = ""
+    length_m: Annotated[float, Quantity("m", above=0.0, most=2e3), "the bench is no longer"] = 1.0
+    angle_rad: Annotated[float, Quantity("rad", "deg", least=-0.5, most=0.5)] = 0.25
+    share: Annotated[float, Share("", least=1e-3, below=0.5)] = 0.125
+
+
+ANGLE = Quantity("rad", "deg", above=-0.25, most=1.5)
+MASS = Quantity("kg", least=2.5, most=40.0)
+PLAIN = Quantity("", above=0.0, most=40.0)
+COUNT = Whole("", least=5, most=40)
+
+
+ALL_OF_A_RULE = {
+    "an angle": (
+        lambda: answered(ANGLE.read, "-0.125 rad"),
+        "-0.125",
+    ),
+    "an angle at its bound": (
+        lambda: answered(ANGLE.read, "-0.25 rad"),
+        """
+        UnitError: "-0.25 rad" is not above -14.32 deg; expected an angle with its unit, above -14.32 deg, at most
+        85.94 deg, for example "5 deg"
+        """,
+    ),
+    "an angle beyond": (
+        lambda: answered(ANGLE.read, "90 deg"),
+        """
+        UnitError: "90 deg" is above 85.94 deg; expected an angle with its unit, above -14.32 deg, at most 85.94
+        deg, for example "5 deg"
+        """,
+    ),
+    "a plain angle": (
+        lambda: answered(ANGLE.read, 7),
+        """
+        UnitError: 7 is a number without a unit; expected an angle with its unit, for example "7 deg"
+        """,
+    ),
+    "an unknown angle": (
+        lambda: answered(ANGLE.read, "unknown"),
+        """
+        UnitError: "unknown" is in no source that the preset names, and has to be given; expected an angle with its
+        unit, above -14.32 deg, at most 85.94 deg, for example "5 deg"
+        """,
+    ),
+    "a mass": (
+        lambda: answered(MASS.read, "2500 g"),
+        "2.5",
+    ),
+    "a mass that is a time": (
+        lambda: answered(MASS.read, "3 s"),
+        """
+        UnitError: "3 s" is in "s", another kind of quantity; expected a mass with its unit, for example "5 kg"
+        """,
+    ),
+    "a small mass": (
+        lambda: answered(MASS.read, "2.4999 kg"),
+        """
+        UnitError: "2.4999 kg" is below 2.5 kg; expected a mass with its unit, at least 2.5 kg, at most 40 kg, for
+        example "5 kg"
+        """,
+    ),
+    "a large mass": (
+        lambda: answered(MASS.read, "40.001 kg"),
+        """
+        UnitError: "40.001 kg" is above 40 kg; expected a mass with its unit, at least 2.5 kg, at most 40 kg, for
+        example "5 kg"
+        """,
+    ),
+    "a plain number": (
+        lambda: answered(PLAIN.read, 40),
+        "40.0",
+    ),
+    "a plain number beyond": (
+        lambda: answered(PLAIN.read, 40.5),
+        """
+        UnitError: 40.5 is above 40; expected a number without quotes, above 0, at most 40, for example "5.0"
+        """,
+    ),
+    "a plain nothing": (
+        lambda: answered(PLAIN.read, 0),
+        """
+        UnitError: 0 is not above 0; expected a number without quotes, above 0, at most 40, for example "5.0"
+        """,
+    ),
+    "a text for a number": (
+        lambda: answered(PLAIN.read, "4"),
+        """
+        UnitError: "4" is not a plain number; expected a number without quotes, for example "1.0"
+        """,
+    ),
+    "a switch for a number": (
+        lambda: answered(PLAIN.read, True),
+        """
+        UnitError: a value of type bool is not a plain number; expected a number without quotes, for example "1.0"
+        """,
+    ),
+    "no number": (
+        lambda: answered(PLAIN.read, math.nan),
+        """
+        UnitError: nan is not a finite number; expected a finite number, for example "1.0"
+        """,
+    ),
+    "a number without end": (
+        lambda: answered(PLAIN.read, -math.inf),
+        """
+        UnitError: -inf is not a finite number; expected a finite number, for example "1.0"
+        """,
+    ),
+    "a number of 400 digits": (
+        lambda: answered(PLAIN.read, 10**400),
+        """
+        UnitError: a value of type int is not a finite number; expected a finite number, for example "1.0"
+        """,
+    ),
+    "a number beyond all": (
+        lambda: answered(PLAIN.read, -1.5e100),
+        """
+        UnitError: -1.5e+100 is beyond 1e+100; expected a number of a mission, or of a mirror, for example "1.0"
+        """,
+    ),
+    "an unknown number": (
+        lambda: answered(PLAIN.read, "unknown"),
+        """
+        UnitError: "unknown" is in no source that the preset names, and has to be given; expected a number without
+        quotes, above 0, at most 40, for example "5.0"
+        """,
+    ),
+    "a count": (
+        lambda: answered(COUNT.read, 40),
+        "40",
+    ),
+    "a count below": (
+        lambda: answered(COUNT.read, 4),
+        """
+        UnitError: 4 is below 5; expected a whole number without quotes, from 5 to 40, for example "5"
+        """,
+    ),
+    "a count beyond": (
+        lambda: answered(COUNT.read, 41),
+        """
+        UnitError: 41 is above 40; expected a whole number without quotes, from 5 to 40, for example "5"
+        """,
+    ),
+    "a count of halves": (
+        lambda: answered(COUNT.read, 7.0),
+        """
+        UnitError: 7 is not a whole number; expected a whole number without quotes, from 5 to 40, for example "5"
+        """,
+    ),
+    "a switch for a count": (
+        lambda: answered(COUNT.read, True),
+        """
+        UnitError: a value of type bool is not a whole number; expected a whole number without quotes, from 5 to 40,
+        for example "5"
+        """,
+    ),
+    "an unknown count": (
+        lambda: answered(COUNT.read, "unknown"),
+        """
+        UnitError: "unknown" is in no source that the preset names, and has to be given; expected a whole number
+        without quotes, from 5 to 40, for example "5"
+        """,
+    ),
+    "a share": (
+        lambda: answered(Share("", below=0.5).read, 0.4375),
+        "0.4375",
+    ),
+    "a share at its end": (
+        lambda: answered(Share("", below=0.5).read, 0.5),
+        """
+        UnitError: 0.5 is not above 0 and below 0.5; expected a number without quotes, above 0 and below 0.5, for
+        example "0.25"
+        """,
+    ),
+    "a share of nothing": (
+        lambda: answered(Share("", below=0.5).read, 0.0),
+        """
+        UnitError: 0 is not above 0 and below 0.5; expected a number without quotes, above 0 and below 0.5, for
+        example "0.25"
+        """,
+    ),
+    "a share at its least": (
+        lambda: answered(Share("", least=1e-6, below=0.25).read, 1e-6),
+        "1e-06",
+    ),
+    "a share below its least": (
+        lambda: answered(Share("", least=1e-6, below=0.25).read, 9e-7),
+        """
+        UnitError: 9e-07 is below 1e-06; expected a number without quotes, at least 1e-06 and below 0.25, for
+        example "0.001"
+        """,
+    ),
+    "a share beyond": (
+        lambda: answered(Share("", least=1e-6, below=0.25).read, 0.25),
+        """
+        UnitError: 0.25 is not above 0 and below 0.25; expected a number without quotes, at least 1e-06 and below
+        0.25, for example "0.001"
+        """,
+    ),
+    "a switch": (
+        lambda: answered(Switch("").read, False),
+        "False",
+    ),
+    "a one for a switch": (
+        lambda: answered(Switch("").read, 1),
+        """
+        UnitError: 1 is neither true nor false; expected true or false, without quotes, for example "true"
+        """,
+    ),
+    "an unknown switch": (
+        lambda: answered(Switch("").read, "unknown"),
+        """
+        UnitError: "unknown" is in no source that the preset names, and has to be given; expected true or false,
+        without quotes, for example "true"
+        """,
+    ),
+    "a word": (
+        lambda: answered(
+            OrWord("m", "cm", above=0.0, most=3.0, word="best", meaning=" of all", stands_for=-2.0).read, "best"
+        ),
+        "-2.0",
+    ),
+    "another word": (
+        lambda: answered(OrWord("m", "cm", above=0.0, most=3.0, word="best", meaning=" of all").read, "worst"),
+        """
+        UnitError: "worst" does not begin with a plain number; expected a length with its unit, above 0 m, at most 3
+        m, or "best" of all, for example "5 cm"
+        """,
+    ),
+    "a length beside a word": (
+        lambda: answered(OrWord("m", "cm", above=0.0, most=3.0, word="best").read, "250 cm"),
+        "2.5",
+    ),
+    "a length too long beside a word": (
+        lambda: answered(OrWord("m", "cm", above=0.0, most=3.0, word="best", meaning=" of all").read, "301 cm"),
+        """
+        UnitError: "301 cm" is above 3 m; expected a length with its unit, above 0 m, at most 3 m, or "best" of all,
+        for example "5 cm"
+        """,
+    ),
+    "a list": (
+        lambda: answered(Several(MASS, rising=True).read, ["3 kg", "4000 g"]),
+        "(3.0, 4.0)",
+    ),
+    "a list that falls": (
+        lambda: answered(Several(MASS, rising=True).read, ["4 kg", "4000 g", "5 kg"]),
+        """
+        ProblemsError: does not rise from item to item: expected a list, rising, each item a mass with its unit, at
+        least 2.5 kg, at most 40 kg
+        """,
+    ),
+    "a list of two that are wrong": (
+        lambda: answered(Several(MASS).read, ["1 kg", "3 kg", 4]),
+        """
+        ProblemsError: item 1: "1 kg" is below 2.5 kg; expected a mass with its unit, at least 2.5 kg, at most 40
+        kg, for example "5 kg": expected a list, each item a mass with its unit, at least 2.5 kg, at most 40 kg;
+        item 3: 4 is a number without a unit; expected a mass with its unit, for example "4 kg": expected a list,
+        each item a mass with its unit, at least 2.5 kg, at most 40 kg
+        """,
+    ),
+    "no list": (
+        lambda: answered(Several(MASS).read, "3 kg"),
+        """
+        ProblemsError: is not a list with something in it: expected a list, each item a mass with its unit, at least
+        2.5 kg, at most 40 kg
+        """,
+    ),
+    "an empty list": (
+        lambda: answered(Several(PLAIN, rising=True).read, []),
+        """
+        ProblemsError: is not a list with something in it: expected a list, rising, each item a number without
+        quotes, above 0, at most 40
+        """,
+    ),
+    "a list of many": (
+        lambda: answered(Several(PLAIN, most=2).read, [1, 2, 3]),
+        "ProblemsError: is a list of 3 items: expected at most 2 items",
+    ),
+    "an unknown list": (
+        lambda: answered(Several(PLAIN).read, "unknown"),
+        """
+        ProblemsError: is in no source that the preset names, and has to be given: expected a list, each item a
+        number without quotes, above 0, at most 40
+        """,
+    ),
+    "a month for all": (
+        lambda: answered(Monthly(PLAIN).read, 2.5),
+        "(2.5,)",
+    ),
+    "a wrong month for all": (
+        lambda: answered(Monthly(PLAIN).read, -2.5),
+        """
+        UnitError: -2.5 is not above 0; expected a number without quotes, above 0, at most 40, or a list of 12 such,
+        January to December, for example "5.0"
+        """,
+    ),
+    "eleven months": (
+        lambda: answered(Monthly(PLAIN).read, [1.0] * 11),
+        """
+        ProblemsError: is a list of 11, and a year has 12 months: expected a number without quotes, above 0, at most
+        40, or a list of 12 such, January to December
+        """,
+    ),
+    "twelve months": (
+        lambda: answered(Monthly(PLAIN).read, list(range(1, 13))),
+        "(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)",
+    ),
+    "twelve months, two of them wrong": (
+        lambda: answered(Monthly(PLAIN).read, [41, *range(1, 11), "12"]),
+        """
+        ProblemsError: item 1: 41 is above 40; expected a number without quotes, above 0, at most 40, for example
+        "5.0": expected a number without quotes, above 0, at most 40, or a list of 12 such, January to December;
+        item 12: "12" is not a plain number; expected a number without quotes, for example "1.0": expected a number
+        without quotes, above 0, at most 40, or a list of 12 such, January to December
+        """,
+    ),
+    "an epoch": (
+        lambda: answered(UtcEpoch("").read, "2028-02-29T23:59:59.25Z"),
+        "'2028-02-29T23:59:59.25Z'",
+    ),
+    "a day that is none": (
+        lambda: answered(UtcEpoch("").read, "2026-02-29T12:00Z"),
+        """
+        UnitError: "2026-02-29T12:00Z" is no date: day is out of range for month; expected a date and time in UTC,
+        for example "2026-03-20T12:00:00Z"
+        """,
+    ),
+    "a date without its zone": (
+        lambda: answered(UtcEpoch("").read, "2026-02-28T12:00:00"),
+        """
+        UnitError: "2026-02-28T12:00:00" is not a date and time with a Z for UTC; expected a date and time in UTC,
+        for example "2026-03-20T12:00:00Z"
+        """,
+    ),
+    "a number for a date": (
+        lambda: answered(UtcEpoch("").read, 20260228),
+        """
+        UnitError: "20260228" is not a date and time with a Z for UTC; expected a date and time in UTC, for example
+        "2026-03-20T12:00:00Z"
+        """,
+    ),
+    "a record in its bounds": (
+        lambda: answered(Held, name="a", length_m=2e3, angle_rad=-0.5, share=1e-3),
+        "Held(name='a', length_m=2000.0, angle_rad=-0.5, share=0.001)",
+    ),
+    "a record too long": (
+        lambda: answered(Held, length_m=2000.5),
+        """
+        ValueError: Held.length_m is 2.001 km: it must be finite, above 0 m, at most 2 km; the bench is no longer
+        """,
+    ),
+    "a named record that is turned too far": (
+        lambda: answered(Held, name="bench 2", angle_rad=-0.625),
+        """
+        ValueError: Held.angle_rad of bench 2 is -35.81 deg: it must be finite, at least -28.65 deg, at most 28.65
+        deg
+        """,
+    ),
+    "a record of no end": (
+        lambda: answered(Held, name="x", share=math.inf),
+        "ValueError: Held.share of x is inf: it must be finite, at least 0.001 and below 0.5",
+    ),
+    "a record of no share": (
+        lambda: answered(Held, share=0.5),
+        "ValueError: Held.share is 0.5: it must be finite, at least 0.001 and below 0.5",
+    ),
+    "a choice of words for an editor": (
+        lambda: OrWord("m", "cm", above=0.0, word="best").__get_pydantic_json_schema__(None, None)["anyOf"][1:],
+        "[{'const': 'best'}]",
+    ),
+    "a number for an editor": (
+        lambda: Quantity("", above=0.5, most=4.0).__get_pydantic_json_schema__(None, None),
+        "{'type': 'number', 'exclusiveMinimum': 0.5, 'maximum': 4.0}",
+    ),
+    "an angle for an editor": (
+        lambda: {k: v for k, v in ANGLE.__get_pydantic_json_schema__(None, None).items() if k != "pattern"},
+        "{'type': 'string', 'x-si-unit': 'rad', 'examples': ['5 deg']}",
+    ),
+    "a share for an editor": (
+        lambda: Share("", least=0.125, below=0.5).__get_pydantic_json_schema__(None, None),
+        "{'type': 'number', 'minimum': 0.125, 'exclusiveMaximum': 0.5}",
+    ),
+    "a share of anything for an editor": (
+        lambda: Share("", below=0.25).__get_pydantic_json_schema__(None, None),
+        "{'type': 'number', 'exclusiveMinimum': 0.0, 'exclusiveMaximum': 0.25}",
+    ),
+    "a count for an editor": (
+        lambda: COUNT.__get_pydantic_json_schema__(None, None),
+        "{'type': 'integer', 'minimum': 5, 'maximum': 40}",
+    ),
+    "a list for an editor": (
+        lambda: Several(PLAIN).__get_pydantic_json_schema__(None, None),
+        """
+        {'type': 'array', 'minItems': 1, 'items': {'type': 'number', 'exclusiveMinimum': 0.0, 'maximum': 40.0}}
+        """,
+    ),
+    "months for an editor": (
+        lambda: Monthly(PLAIN).__get_pydantic_json_schema__(None, None),
+        """
+        {'anyOf': [{'type': 'number', 'exclusiveMinimum': 0.0, 'maximum': 40.0}, {'type': 'array', 'minItems': 12,
+        'maxItems': 12, 'items': {'type': 'number', 'exclusiveMinimum': 0.0, 'maximum': 40.0}}]}
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_RULE)
+def test_what_a_rule_reads_and_what_it_says_of_what_it_does_not_read(what):
+    call, words = ALL_OF_A_RULE[what]
+    assert one_line(str(call())) == one_line(words)
+
+
+def said(text):
+    """Every statement of a text with all that it says of it, one a line."""
+    return "; ".join(
+        f"{s.kind} {s.key} {s.line}-{s.last_line} {s.value!r} {s.comment!r} {s.depth} {s.closed} {s.place}"
+        for s in scan(text)
+    )
+
+
+def read_as(content, **how):
+    """The faults of a text as a file of these keys, or what is read of it."""
+    how = {"names": None, "prefix": "", "most_bytes": 300} | how
+    try:
+        document = Document.of(content, Path("m.toml"), "mission file", how["prefix"], how["names"], how["most_bytes"])
+    except UnreadableError as error:
+        return f"unreadable: {error}"
+    except MissionError as error:
+        return str(error)
+    faults = re.sub("is not TOML: .*", "is not TOML", "; ".join(map(str, document.faults)))  # whose words are Python's
+    return f"{document.data} {sorted(document.damaged)} {faults}"
+
+
+ALL_OF_A_TEXT = {
+    "tables and lists of tables and keys in them": (
+        lambda: said(
+            'a = 1\n[b.c] # h\nd."e f" = [ # 1\n  2, # 2\n  3\n] # 3\n[[g]]\nh = "x # y"\n[[g]]\nh = {i = [1]}\n'
+        ),
+        r"""
+        key a 1-1 '1' '' 0 True 4; table b.c 2-2 '' '' 0 True 0; key b.c.d.e f 3-6 '[ # 1\n 2, # 2\n 3\n]' '3' 1
+        True 26; tables g 7-7 '' '' 0 True 0; key g#7.h 8-8 '"x # y"' '' 0 True 61; tables g 9-9 '' '' 0 True 0; key
+        g#9.h 10-10 '{i = [1]}' '' 2 True 79
+        """,
+    ),
+    "a list that is not closed": (
+        lambda: said("a = [1,\n 2\nb = 3\n[c\nd = 4\nwords\n e = 5"),
+        r"""
+        key a 1-2 '[1,\n 2' '' 1 False 4; key b 3-3 '3' '' 0 True 15; broken c 4-4 '[c' '' 0 True 0; key c.d 5-5 '4'
+        '' 0 True 24; junk 6-6 'words' '' 0 True 0; key c.e 7-7 '5' '' 0 True 37
+        """,
+    ),
+    "texts of several lines": (
+        lambda: said('a = """x\n[b]\ny""" # z\n\nb = \'c # d\' # e\n'),
+        r'''key a 1-3 '"""x\n[b]\ny"""' 'z' 0 True 4; key b 5-5 "'c # d'" 'e' 0 True 27''',
+    ),
+    "a key twice, and a table": (
+        lambda: read_as(b"a = 1\nb = 2\na = 3\n[c]\nd = 4\n[c]\ne = 5\n"),
+        """
+        {'a': 1, 'b': 2, 'c': {'d': 4}} ['a', 'c'] m.toml, line 3: a = 3 this key stands twice, on lines 1 and 3
+        expected: one of the two removed; m.toml, line 6: c this table stands twice, on lines 4 and 6 expected: one
+        of the two removed
+        """,
+    ),
+    "a header that is none, and words": (
+        lambda: read_as(b"a = 1\n[b\nc = 2\nwords here\n[d]\ne = 3\n"),
+        "{'a': 1, 'd': {'e': 3}} ['b'] m.toml, line 2: [b is no table header expected: [b]",
+    ),
+    "a value without quotes, and one that is missing": (
+        lambda: read_as(b'a = 5 W\nb =\nc = "d\n'),
+        """
+        {} ['a', 'b', 'c'] m.toml, line 1: a = 5 W is not TOML expected: text in quotes: a = "5 W"; m.toml, line 2:
+        b has no value expected: b = "value"; m.toml, line 3: c = "d is not TOML expected: quotes and brackets
+        closed, and one key = value on a line
+        """,
+    ),
+    "a value that is too deep": (
+        lambda: read_as(b"a = " + b"[" * 17 + b"]" * 17 + b"\nb = [" + b"[" * 15 + b"]" * 15 + b"]"),
+        """
+        {'b': [[[[[[[[[[[[[[[[]]]]]]]]]]]]]]]]} ['a'] m.toml, line 1: a = [[[[[[[[[[[[[[[[[]]]]]]]]]]]]]]]]] is
+        nested 17 brackets deep expected: a value, or a list of values
+        """,
+    ),
+    "a number that is too long": (
+        lambda: read_as(b"a = 1" + b"0" * 400 + b"\nb = -1" + b"0" * 20, most_bytes=2000),
+        """
+        {'b': -100000000000000000000} ['a'] m.toml, line 1: a =
+        100000000000000000000000000000000000000000000000000000000000… is a number of 401 characters expected: a
+        number of at most 17 digits
+        """,
+    ),
+    "a key of another file": (
+        lambda: read_as(b"[mirror]\nx = 1 2\nname = 3 4\n[other", names={"name"}, prefix="mirror"),
+        """
+        {'mirror': {}} ['mirror.mirror.name', 'mirror.mirror.x', 'mirror.other'] m.toml, line 4 is no table header
+        expected: key = "value", [table] or # comment; m.toml, line 2 is not TOML expected: key = "value", [table]
+        or # comment; m.toml, line 3: mirror.mirror.name = 3 4 is not TOML expected: text in quotes: name = "3 4"
+        """,
+    ),
+    "a name that cannot be printed": (
+        lambda: read_as(b'"a\\u0007b" = 1\n[[c]]\n"d\\u200be" = 2\n'),
+        r"""
+        {'a\x07b': 1, 'c': [{'d\u200be': 2}]} [] m.toml: a\u0007b has the name "a\u0007b", with characters that
+        cannot be printed expected: a name of letters, digits and signs; m.toml, line 2: c.d\u200be has the name
+        "d\u200be", with characters that cannot be printed expected: a name of letters, digits and signs
+        """,
+    ),
+    "binary data": (
+        lambda: read_as(b"a\0b"),
+        "unreadable: holds binary data; expected a TOML file, plain text in UTF-8",
+    ),
+    "a text in another code": (
+        lambda: read_as(b"a = 1\n\nb = '\xff'"),
+        "unreadable: is not UTF-8 text (line 3); expected the file saved again as UTF-8",
+    ),
+    "nothing but blanks": (
+        lambda: read_as(b" \n \n"),
+        "unreadable: is empty; expected a TOML file; `microrad init` writes one to start from",
+    ),
+    "too much": (
+        lambda: read_as(b"a" * 301),
+        "unreadable: is larger than 0 kB; expected a TOML file of a few kB",
+    ),
+    "too much by kilobytes": (
+        lambda: read_as(b"a" * 2400, most_bytes=2399),
+        "unreadable: is larger than 2 kB; expected a TOML file of a few kB",
+    ),
+    "too many lines": (
+        lambda: read_as(b"\n" * 10_001, most_bytes=20_000),
+        "unreadable: has more than 10000 lines; expected a TOML file of a few hundred lines",
+    ),
+    "a mark at its begin, and line ends of another system": (
+        lambda: read_as(b"\xef\xbb\xbfa = 1\r\nb = 2\r\n"),
+        "{'a': 1, 'b': 2} []",
+    ),
+    "a value of a list": (
+        lambda: [
+            value_of('[1, "a", true]'),
+            value_of("1 2"),
+            value_of("{" + "a." * 51 + "b = 1}"),
+            value_of("1.50", str),
+            value_of("[" * 2000),
+        ],
+        "[[1, 'a', True], None, None, '1.50', None]",
+    ),
+    "values as they are shown": (
+        lambda: (
+            " ".join(shown(v) for v in ({}, list(range(12)), ["a", [True]], "b\nc", 2**201, False, 2.5, "d" * 121))
+            + str(len(shown("e" * 120)))
+        ),
+        r"""
+        (a table) [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, …] ["a", [true]] "b\u000ac" (a whole number of 202 bits) false 2.5
+        "dddddddddddddddddddddddddddddddddddddddddddddddddddddddddddd…"122
+        """,
+    ),
+    "a fault with all there is": (
+        lambda: Fault("a.b", '"5 m"', 7, "is wrong", "another", "c", "m.toml"),
+        """m.toml, line 7: a.b = "5 m" is wrong did you mean c? expected: another""",
+    ),
+    "a fault of a file": (
+        lambda: Fault("", "", 0, "is wrong", "another", "", "m.toml"),
+        "m.toml is wrong expected: another",
+    ),
+    "a fault of a key without a value": (
+        lambda: Fault("a.b", "", 3, "is missing", "another", "", "m.toml"),
+        "m.toml, line 3: a.b is missing expected: another",
+    ),
+    "sources of several keys, of which two are alike": (
+        lambda: source_text(
+            {
+                "a": Source(3, "paper: Table 2"),
+                "b": Source(4, "paper: Table 2"),
+                "c": Source(5, "", file="mirror file"),
+                "d": Source(6, "paper: Table 3", '"6 cm"', was='"5 cm"'),
+            },
+            "a",
+            "b",
+            "x",
+            "c",
+            "d",
+            "a",
+        ),
+        """
+        paper: Table 2; not stated; mirror file, line 5; mission file, line 6, in place of 5 cm (paper: Table 3)
+        """,
+    ),
+    "kinds of sources": (
+        lambda: [
+            Source(1, comment).kind
+            for comment in ("assumption: x", "guess: x", "measured", "identified: a: b", ": x", "")
+        ],
+        "['assumption', '', '', 'identified', '', '']",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_TEXT)
+def test_what_is_read_of_a_text_and_what_is_told_of_its_faults(what):
+    call, words = ALL_OF_A_TEXT[what]
+    assert one_line(str(call())) == one_line(words)
