@@ -13,7 +13,7 @@ from microrad import link
 from microrad.core.capacity import Code, entropy
 from microrad.core.pulse_capacity import soft_bits
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
-from microrad.mission.codes import codes
+from microrad.mission.codes import NamedCode, _code, codes, nearest
 from microrad.mission.toml import MissionError
 
 KNOWN = {name: code for name, code in codes().items() if code.known}
@@ -202,3 +202,79 @@ def test_a_name_that_no_code_has_is_refused_with_the_nearest(tmp_path):
     found, text = fault_of(tmp_path, wrong)
     assert found == "communication.receiver.code"
     assert text.startswith('is "dvbs2-1/2", which is no code that is known here: code = "dvb-s2-')
+
+
+WRITTEN = {"title": "t", "modulations": ["ook", "ppm"], "rate": "3/7", "source": "s"}
+
+
+@pytest.mark.parametrize(
+    ("table", "ratios", "threshold", "weights", "gap", "known"),
+    [
+        # Es/N0 of a symbol with 2 * 3 / 7 bits of information
+        (
+            {"bit_error_ratio_up_to": 1e-6, "threshold_symbol": "4.5 dB"},
+            *((0.0, 1e-6), 4.5 - 10.0 * math.log10(6.0 / 7.0), (), None, True),
+        ),
+        (
+            {"weights": {"5": 3, "7": 2}, "bit_error_ratio": 1e-4, "bit_error_ratio_up_to": 1e-3},
+            *((1e-4, 1e-3), None, ((5, 3), (7, 2)), None, True),
+        ),
+        ({"gap": "1.5 dB", "bit_error_ratio": 1e-4}, (1e-4, 1e-4), None, (), 1.5, True),
+        ({"threshold": "2.25 dB", "bit_error_ratio": 3e-4}, (3e-4, 3e-4), 2.25, (), None, True),
+        ({"threshold": "unknown", "bit_error_ratio_up_to": 0.01}, (0.0, 0.01), None, (), None, False),
+    ],
+)
+def test_a_code_is_read_of_each_way_that_a_source_prints(table, ratios, threshold, weights, gap, known):
+    found = _code("x", WRITTEN | table)
+    assert (found.name, found.title, found.modulations, found.source) == ("x", "t", ("ook", "ppm"), "s")
+    assert found.rate == 3 / 7
+    assert (found.ratios, found.weights, found.gap_db, found.known) == (ratios, weights, gap, known)
+    assert found.threshold_db == (None if threshold is None else pytest.approx(threshold, rel=1e-12))
+    assert math.isnan(_code("x", WRITTEN).ratios[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "ratio", "gain_db"),
+    [
+        ("ccsds-k7-1-2", 1e-3, 4.07656),
+        ("ccsds-k7-1-2", 2.5e-5, 5.25768),
+        ("ccsds-k7-1-2", 4e-7, 5.83197),
+        ("dvb-s2-1-4", 2.5e-7, 10.2688),
+        ("dvb-s2-9-10", 1e-7, 7.41382),
+    ],
+)
+def test_the_gain_of_a_code_is_that_of_its_ratio(name, ratio, gain_db):
+    assert codes()[name].net_gain_db(ratio) == pytest.approx(gain_db, rel=1e-5)
+
+
+def test_a_code_says_what_its_threshold_holds_for():
+    said = [codes()[name].regime for name in ("ccsds-k7-1-2", "dvb-s2-3-4", "scppm-1-2")]
+    assert said == [
+        "convolutional code K = 7, rate 1/2, soft Viterbi decoding: union bound over its paths, Gaussian noise, no "
+        "quantisation",
+        "DVB-S2, LDPC and BCH, 64800 bits, rate 3/4: Gaussian noise, no loss in synchronisation",
+        "serially concatenated pulse-position modulation, rate 1/2: 1 dB from capacity, in one link, is taken for any "
+        "order and background",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "least", "holds"),
+    [(2e-4, 1e-4, True), (1e-4, 1e-4, True), (9.9e-5, 1e-4, False), (1.01e-3, 1e-4, False), (9e-5, 0.0, True)],
+)
+def test_a_threshold_holds_between_two_ratios(ratio, least, holds):
+    code = NamedCode("x", "t", (), 0.5, (least, 1e-3), 1.0, (), None, "")
+    assert code.holds_at(ratio) is holds
+    assert code.holds_at(1e-3 * (1.0 + 5e-10)) and code.holds_at(least * (1.0 - 5e-10))
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("dvb-s2-7-8", 'code = "dvb-s2-8-9" or code = "dvb-s2-5-6" or code = "dvb-s2-4-5"'),
+        ("SCPPM", 'code = "scppm-1-2"'),
+        ("ccsds-k9-1-2", 'code = "ccsds-k7-1-2" or code = "dvb-s2-1-2" or code = "scppm-1-2"'),
+    ],
+)
+def test_of_a_name_like_some_codes_those_that_are_known_are_told(name, near):
+    assert nearest(name) == near

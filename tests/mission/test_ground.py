@@ -12,7 +12,7 @@ from link_files import data_with, link_file, written
 from made_tables import made, one_line, told
 from microrad.link import Shared
 from microrad.mission.file import MissionError, load_link
-from microrad.mission.ground import GroundPath, geocentric_radius_m, ground_fits
+from microrad.mission.ground import GroundPath, geocentric_radius_m, ground_fits, path_of, range_of
 from microrad.mission.tables.channel import Channel, TurbulenceTable
 from microrad.mission.tables.orbit import Orbits, OrbitTable
 from microrad.orbit import Epoch, Station
@@ -595,3 +595,99 @@ ALL_OF_THE_AIR = {
 def test_all_that_does_not_fit_about_the_air_is_told_in_full(what):
     problems, words = ALL_OF_THE_AIR[what]
     assert told(problems()) == one_line(words)
+
+
+NEAR_TENERIFE = (0.296706, 2393.0, 6375754.79)
+PATHS = {
+    "a circle below": (CIRCLE, TENERIFE, {}, "geo", *NEAR_TENERIFE, 7003137.0, "orbit.geo.mask orbit.leo.altitude"),
+    "an ellipse by its apogee": (
+        TENERIFE,
+        end("keplerian", semi_major_axis_m=7.25e6, eccentricity=0.0625),
+        {},
+        *("leo", *NEAR_TENERIFE, 7703125.0, "orbit.leo.mask orbit.geo.semi_major_axis"),
+    ),
+    "an ellipse that is a circle": (
+        TENERIFE,
+        end("keplerian", semi_major_axis_m=7.25e6),
+        {},
+        *("leo", *NEAR_TENERIFE, 7.25e6, "orbit.leo.mask orbit.geo.semi_major_axis"),
+    ),
+    "elements with the altitude of the air": (
+        end("elements"),
+        TENERIFE,
+        {"altitude_m": 5.5e5},
+        *("geo", *NEAR_TENERIFE, 6928137.0, "orbit.geo.mask channel.altitude"),
+    ),
+    "elements of any altitude": (
+        end("elements"),
+        TENERIFE,
+        {},
+        *("geo", *NEAR_TENERIFE, None, "orbit.geo.mask channel.altitude"),
+    ),
+    "a slot in the west": (
+        end("geostationary", longitude_rad=-43.5 * deg),
+        TENERIFE,
+        {},
+        *("geo", 0.796149, *NEAR_TENERIFE[1:], 42164169.6, "orbit.geo.latitude orbit.leo.longitude"),
+    ),
+    "a slot in the east": (
+        TENERIFE,
+        end("geostationary", longitude_rad=12.0 * deg),
+        {},
+        *("leo", 0.776948, *NEAR_TENERIFE[1:], 42164169.6, "orbit.leo.latitude orbit.geo.longitude"),
+    ),
+    "all typed": (
+        None,
+        None,
+        {"elevation_rad": 0.5, "station": "leo", "height_m": 1250.0, "altitude_m": 7.5e5},
+        *("leo", 0.5, 1250.0, 6379387.0, 7128137.0, "channel.elevation channel.altitude"),
+    ),
+    "an elevation": (None, None, {"elevation_rad": 0.5}, "", 0.5, 0.0, 6378137.0, None, "channel.elevation"),
+}
+
+
+@pytest.mark.parametrize("what", PATHS)
+def test_a_path_has_its_end_its_elevation_its_radii_and_their_sources(what):
+    leo, geo, channel, station, elevation, height, own, radius, sources = PATHS[what]
+    path = path_of(None if leo is None else made(Orbits, leo=leo, geo=geo), made(Channel, **channel))
+    assert (path.station, path.doubt, " ".join(path.sources)) == (station, "", sources)
+    found = (path.elevation_rad, path.height_m, path.station_radius_m, path.satellite_radius_m)
+    for each, wanted in zip(found, (elevation, height, own, radius), strict=True):
+        assert each is None if wanted is None else each == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("geo", "altitude", "doubt"),
+    [
+        (CIRCLE, None, ""),
+        (end("elements"), None, ": from 625 km up the range at 28.65 deg is 1149 km"),
+        (end("elements"), 8e5, ": from 625 km up the range at 28.65 deg is 1149 km"),
+    ],
+)
+def test_an_elevation_beside_orbits_is_doubted_with_the_height_of_the_lower_end(geo, altitude, doubt):
+    """The lower end is the first one, whatever the air says of an altitude."""
+    leo = CIRCLE if doubt else end("elements")
+    channel = made(Channel, elevation_rad=0.5, height_m=1250.0, altitude_m=altitude)
+    said = "elevation and distance are typed beside the table orbit, in which both terminals fly"
+    assert path_of(made(Orbits, leo=leo, geo=geo), channel).doubt == said + doubt
+
+
+def test_there_is_no_path_without_air_an_elevation_or_a_whole_station():
+    assert path_of(made(Orbits, leo=CIRCLE, geo=TENERIFE), None) is None
+    assert path_of(None, made(Channel, altitude_m=1e6)) is None
+    for lacking in ("latitude_rad", "height_m", "mask_rad"):
+        site = TENERIFE.model_copy(update={lacking: None})
+        assert path_of(made(Orbits, leo=CIRCLE, geo=site), made(Channel)) is None
+
+
+def test_range_elevation_and_altitude_of_a_station_above_the_sea_are_one_triangle():
+    path = GroundPath("leo", 0.375, 2500.0, 6.38e6, 7.25e6, ("a",))
+    far = path.range_at(0.5)
+    assert far == pytest.approx(1547126.48, rel=1e-6)
+    assert math.hypot(far * math.cos(0.5), 6.38e6 + far * math.sin(0.5)) == pytest.approx(7.25e6, rel=1e-12)
+    assert path.elevation_at(far) == pytest.approx(0.5, rel=1e-9)
+    assert path.elevation_at(8.0e5) == math.pi / 2  # nearer than the zenith
+    assert path.altitude_of(1.25e6) == pytest.approx(557924.33, rel=1e-6)
+    assert path.at(0.625) == GroundPath("leo", 0.625, 2500.0, 6.38e6, 7.25e6, ("a",))
+    assert range_of(SimpleNamespace(distance_m=7e5), path) == 7e5
+    assert range_of(SimpleNamespace(distance_m=None), path) == path.range_at(0.375)
