@@ -273,7 +273,7 @@ def test_a_threshold_holds_between_two_ratios(ratio, least, holds):
     [
         ("dvb-s2-7-8", 'code = "dvb-s2-8-9" or code = "dvb-s2-5-6" or code = "dvb-s2-4-5"'),
         ("SCPPM", 'code = "scppm-1-2"'),
-        ("ccsds-k9-1-2", 'code = "ccsds-k7-1-2" or code = "dvb-s2-1-2" or code = "scppm-1-2"'),
+        ("ccsds-k9-1-2", 'code = "ccsds-k7-1-2" or code = "dvb-s2-1-2"'),
     ],
 )
 def test_of_a_name_like_some_codes_those_that_are_known_are_told(name, near):
