@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import budgets
+from made_tables import one_line
 from microrad import link
 from microrad.core import kernels
 from microrad.link import study as link_study
@@ -1054,3 +1055,207 @@ def test_a_window_behind_a_loss_ends_with_its_contact(lost_s, left_s):
     behind = [each.start_s for each in found]
     last = [1598.0] if lost_s + 3.0 <= 1598.0 else []  # it would begin before the one behind the loss has ended
     assert behind == [1100.0, lost_s + 1.0, *last]
+
+
+def refusal(call, *given, **named):
+    """The words in which a call refuses what it is given."""
+    with pytest.raises(ValueError) as error:
+        call(*given, **named)
+    return str(error.value)
+
+
+def logged(log):
+    """Every entry of a log, in its words."""
+    return " || ".join(f"{e.time_s:g} {e.state} {e.to} {e.cause}" for e in log.entries)
+
+
+def turned(**free):
+    """The log of a slew by 1.25 rad in 50 s."""
+    log = sequence.Log(contact(1000.0, 600.0, **free))
+    sequence._turn(log, settings(slew_angle_rad=1.25, slew_rate_rad_s=0.025))
+    return logged(log)
+
+
+def regained(lost, losses, length_s=600.0):
+    """The log of a loss behind 120 s of data, where three in a row are too many."""
+    log = sequence.Log(contact(1000.0, length_s))
+    log.go(1080.0, State.DATA, "locked")
+
+    class Acquire:
+        attempts = 3
+
+        def __call__(self):
+            return log.go(1230.0, State.DATA, "again")
+
+    sequence._regain(log, Acquire(), lost, losses)
+    return logged(log)
+
+
+def stepped(*entries, again=False, length_s=600.0):
+    """The log of an acquisition of eleven stages that goes by these entries: time, stage, where it leads, and why."""
+    found = SimpleNamespace(name="wide beacon", stages=[SimpleNamespace(name=f"s{place}") for place in range(11)])
+    log = sequence.Log(contact(1000.0, length_s))
+    log.go(1000.0, State.BEACON, "begun")
+    acquire = sequence._Acquisitions(log, found, 7, 1)
+    for time_s, stage, to, cause in entries:
+        acquire._step(time_s, SimpleNamespace(stage=stage, to=to, cause=cause), again)
+    return logged(log)
+
+
+ALL_OF_A_CONTACT = {
+    "settings with a slew the wrong way": (
+        lambda: refusal(settings, slew_angle_rad=-0.125),
+        "slew_angle_rad of a contact run is -0.125: it must be finite and from 0 to pi rad",
+    ),
+    "settings with a slew by more than half a turn": (
+        lambda: refusal(settings, slew_angle_rad=3.25),
+        "slew_angle_rad of a contact run is 3.25: it must be finite and from 0 to pi rad",
+    ),
+    "settings with a slew that stands": (
+        lambda: refusal(settings, slew_rate_rad_s=0.0),
+        "slew_rate_rad_s of a contact run is 0: it must be finite and above 0 rad/s",
+    ),
+    "settings with no window": (
+        lambda: refusal(settings, windows=0),
+        "windows of a contact run is 0: it must be finite and from 1 to 100000",
+    ),
+    "settings with too many windows": (
+        lambda: refusal(settings, windows=100_001),
+        "windows of a contact run is 100001: it must be finite and from 1 to 100000",
+    ),
+    "settings with a window without length": (
+        lambda: refusal(settings, window_s=0.0),
+        "window_s of a contact run is 0: it must be finite and above 0 s",
+    ),
+    "settings with a settling before": (
+        lambda: refusal(settings, settle_s=-0.5),
+        "settle_s of a contact run is -0.5: it must be finite and at least 0 s",
+    ),
+    "settings with a hold as long as a window": (
+        lambda: refusal(settings, window_s=0.25, hold_s=0.375),
+        """
+        hold_s of a contact run is 0.375: it must be finite and at least 0 s and below window_s (250 ms): a window
+        shows no loss that takes longer
+        """,
+    ),
+    "settings with a seed below nothing": (
+        lambda: refusal(settings, seed=-3),
+        "seed of a contact run is -3: it must be finite and from 0 to 2^63 - 1",
+    ),
+    "settings with another way": (
+        lambda: refusal(settings, way="beacon"),
+        """
+        way of a contact run is "beacon": it must be "wide beacon" or "scan"
+        """,
+    ),
+    "a contact that ends before": (
+        lambda: refusal(Contact, 5.5, 4.25, "", "", 0.0, None),
+        "a contact from 5.5 s to 4.25 s has no length: its end must be finite and come after its begin",
+    ),
+    "a contact whose body is late": (
+        lambda: refusal(Contact, 5.5, 9.25, "", "", 6.75, None),
+        """
+        free_from_s is 6.75 s, and the contact begins at 5.5 s: it must be finite and no later; where the body is
+        busy for longer, let the contact begin later
+        """,
+    ),
+    "a geometry of another shape": (
+        lambda: refusal(contact(geometry=lambda t: Sight(t + 1.0, t[1:], t)).sight, np.array([1.0, 2.0, 3.0])),
+        "the geometry gives rate_rad_s with the shape (2,) for times of (3,)",
+    ),
+    "a geometry whose second time is none": (
+        lambda: refusal(
+            contact(geometry=lambda t: Sight(t, t, np.array([0.0, -2.5, np.nan]))).sight, np.array([1.5, 2.5, 3.5])
+        ),
+        """
+        the geometry gives point_ahead_rad = -2.5 at 2.500 s, which must be finite and at least 0: is that time
+        within what the orbits cover?
+        """,
+    ),
+    "a slew in time": (
+        lambda: turned(free_from_s=900.0),
+        """
+        950 idle slew 1.25 rad at 25 mrad/s, so that the slew ends when the contact begins || 1000 slew beacon the
+        contact begins: the Earth's limb
+        """,
+    ),
+    "a slew that is late": (
+        lambda: turned(free_from_s=962.5),
+        """
+        962.5 idle slew 1.25 rad at 25 mrad/s, as soon as the body is free || 1012.5 slew beacon the slew ends 12.5
+        s after the contact began: the Earth's limb
+        """,
+    ),
+    "a loss by the light": (
+        lambda: regained(Loss(1200.0, 1200.25, 1200.5, "dark"), 2),
+        """
+        1080 idle data locked || 1200.25 data loss dark || 1200.5 loss re-acquire the light has gone there and back,
+        250 ms || 1230 re-acquire data again
+        """,
+    ),
+    "a loss by the sensor": (
+        lambda: regained(Loss(1200.0, 1200.25, 1200.25, "off"), 1),
+        """
+        1080 idle data locked || 1200.25 data loss off || 1200.25 loss re-acquire seen by its own sensor || 1230
+        re-acquire data again
+        """,
+    ),
+    "the last loss": (
+        lambda: regained(Loss(1200.0, 1200.25, 1200.75, "dark"), 3),
+        """
+        1080 idle data locked || 1200.25 data loss dark || 1200.75 loss end given up after 3 losses of lock in as
+        many windows in a row; the light has gone there and back, 500 ms
+        """,
+    ),
+    "a loss that is known too late": (
+        lambda: regained(Loss(1200.0, 1200.25, 1201.25, "dark"), 1, length_s=201.0),
+        """
+        1080 idle data locked || 1200.25 data loss dark || 1201 loss end the contact ends: eclipse of LEO
+        """,
+    ),
+    "an acquisition": (
+        lambda: stepped(
+            (1001.0, "s0", "s1", "seen"),
+            (1002.0, "s1", "s2", "found"),
+            (1003.0, "s2", "s3", "told"),
+            (1004.5, "s3", "s4", "turned"),
+            (1005.0, "s5", "s6", "met"),
+            (1007.0, "s10", acquisition.LOCKED, "held"),
+        ),
+        """
+        1000 idle beacon begun || 1002 beacon detect s1: found || 1003 detect answer s2: told || 1005 answer lock
+        s5: met || 1007 lock data s10: held
+        """,
+    ),
+    "an acquisition that begins again": (
+        lambda: stepped(
+            (1001.0, "s1", "s0", "not seen"), (1003.0, "s4", "s0", "lost"), (1009.0, "s7", acquisition.LOST, "dark")
+        ),
+        """
+        1000 idle beacon begun || 1001 beacon beacon s1: not seen || 1003 beacon beacon s4: lost || 1009 beacon end
+        acquisition given up after 7 failures; s7: dark
+        """,
+    ),
+    "an acquisition behind a loss": (
+        lambda: stepped(
+            (1001.0, "s1", "s2", "found"),
+            (1003.0, "s4", "s0", "lost"),
+            (1009.0, "s9", acquisition.LOCKED, "held"),
+            again=True,
+        ),
+        """
+        1000 idle beacon begun || 1001 beacon re-acquire beacon to detect; s1: found || 1003 re-acquire re-acquire
+        answer to beacon; s4: lost || 1009 re-acquire data s9: held
+        """,
+    ),
+    "an acquisition that the contact cuts short": (
+        lambda: stepped((1001.0, "s3", "s4", "turned"), (1010.0, "s6", "s7", "met"), length_s=10.0),
+        "1000 idle beacon begun || 1010 beacon end the contact ends: eclipse of LEO",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_CONTACT)
+def test_what_a_contact_does_and_refuses_is_told_in_full(what):
+    call, words = ALL_OF_A_CONTACT[what]
+    assert one_line(str(call())) == one_line(words)
