@@ -1,19 +1,26 @@
 """What a campaign file has to have, check by check: each condition by itself, and each limit at its very value."""
 
+import contextlib
 import math
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from made_tables import one_line
 from microrad.campaign.definition import checks, distributions, draws, keys, values
 from microrad.campaign.definition.distributions import LogUniform, Normal, OneOf, Uniform, uncovered
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
+from microrad.campaign.definition.records import Draw
 from microrad.campaign.definition.values import NotedError
 from microrad.campaign.records import Limit
 from microrad.mirror import Variant
 from microrad.mission.fields import OrWord, Quantity, Several, Share, Table, Whole
 from microrad.mission.file import load_mission
+from microrad.mission.toml import Document
 from shipped import SHIPPED
 
 
@@ -582,3 +589,644 @@ def test_a_limit_that_nothing_checks_is_told_as_it_was_given():
     margin, error = checks.unchecked([], ["margin", "residual_quantile"], required, [])
     assert margin.endswith('[limits.margin] with least = "3.0625 dB" checks it')
     assert error.endswith('[limits.residual_quantile] with most = "12.3456 µrad" checks it')
+
+
+DATA = tomllib.loads(SHIPPED.read_text(encoding="utf-8"))
+
+
+def noted(check, *given, into=None, **more):
+    """The faults that a check notes in a campaign file, in their words, or what it gives where it notes none."""
+    document = Document(Path("c.toml"), "campaign file", "")
+    found = None
+    with contextlib.suppress(NotedError):
+        found = check(values.ValueReader(document), *given, **more)
+        found = list(found) if isinstance(found, Iterator) else found
+    said = "; ".join(f"{f.key} = {f.value} {f.reason}: {f.expected} ({f.nearest})" for f in document.faults)
+    return said or repr(found)
+
+
+def drawn(key, raw, data=DATA):
+    """What an input of the shipped mission is drawn from, or the faults of its table."""
+    return noted(lambda reader: draws.DrawReader(reader, data, (), frozenset()).draw(key, raw))
+
+
+def required(**changes):
+    given = {"margin_db": 3.125, "pointing_error_rad": 12.5e-6}
+    return SimpleNamespace(**given | changes)
+
+
+def campaign(**tables):
+    """The tables of a campaign file, with nothing in them but these."""
+    given = {"tail": None, "loop": None, "precision": None, "optimise": None, "runs": 20}
+    return SimpleNamespace(**given | tables)
+
+
+def found_or_refused(key, data=DATA):
+    """A key of the shipped mission, or why it is none."""
+    try:
+        found = keys.find(key, data)
+    except keys.UnknownKeyError as error:
+        return f"{error.reason}: {error.expected} ({error.nearest})"
+    return f"{found.text} {found.name} {found.table.__name__} {found.unit!r} {found.item} {found.numeric is not None}"
+
+
+ALL_OF_A_CHECK = {
+    "a loop without a table": (
+        lambda: noted(checks.check_loop, loop(), [SimpleNamespace(fine_pointing=None)]),
+        """
+        loop = needs a mission with the table [fine_pointing]: a mission with [fine_pointing], which microrad init
+        writes, or [loop] removed ()
+        """,
+    ),
+    "the outputs to keep": (
+        lambda: noted(checks.kept, ["volume", "margn", 3, "residual_rms", "margin"], campaign()),
+        """
+        keep = "margn" is no output: one of residual_rms, residual_quantile, residual_largest, beyond_share,
+        lost_share, saturated_share, beyond_rate_share, outside_share, margin, margin_under_fades, outage, short,
+        data_rate, beacon_margin, answer_margin, volume, contact_time, optical_volume ("margin"); keep = 3 is no
+        output: one of residual_rms, residual_quantile, residual_largest, beyond_share, lost_share, saturated_share,
+        beyond_rate_share, outside_share, margin, margin_under_fades, outage, short, data_rate, beacon_margin,
+        answer_margin, volume, contact_time, optical_volume (); keep = "residual_rms" needs the fine-pointing loop:
+        a table [loop], or this output left out ()
+        """,
+    ),
+    "nothing to keep": (
+        lambda: noted(checks.kept, "margin", campaign()),
+        """keep = "margin" is not a list with something in it: names of outputs: keep = ["margin"] ()""",
+    ),
+    "outputs of tables that are not there": (
+        lambda: noted(
+            checks.with_tables,
+            0,
+            ("beacon_margin", "margin", "margin_under_fades", "optical_volume"),
+            ["beacon", "communication.fading", "operations.optical"],
+        ),
+        """
+        keep = "beacon_margin" needs the mission's table [beacon]: a mission with [beacon], or this output left out
+        (); keep = "margin_under_fades" needs the mission's table [communication.fading] with a series: a mission
+        with [communication.fading] with a series, or this output left out (); keep = "optical_volume" needs the
+        mission's table [operations.optical]: a mission with [operations.optical], or this output left out ()
+        """,
+    ),
+    "outputs of tables that nobody asks for": (
+        lambda: noted(checks.with_tables, None, ("beacon_margin", "answer_margin", "margin"), ["answer", "operations"]),
+        "('beacon_margin', 'margin')",
+    ),
+    "outputs of a day that is not there": (
+        lambda: noted(checks.check_day, ("margin", "volume", "contact_time"), ["beacon", "operations"]),
+        """
+        keep = ["volume", "contact_time"] needs the mission's tables [orbit] and [operations]: a mission with
+        [orbit] and [operations], which microrad init writes, or these outputs left out ()
+        """,
+    ),
+    "a limit that varies in both": (
+        lambda: noted(
+            checks.default_limits,
+            ("residual_quantile", "margin"),
+            required(),
+            {"grid": {"requirement.margin": 0}, "inputs": {"requirement.pointing_error": 0, "requirement.margin": 0}},
+        ),
+        """
+        grid.requirement.margin = is the limit of margin as well, which is the same in all rows: a table
+        [limits.margin] with a value of its own (); inputs.requirement.margin = is the limit of margin as well,
+        which is the same in all rows: a table [limits.margin] with a value of its own ();
+        inputs.requirement.pointing_error = is the limit of residual_quantile as well, which is the same in all
+        rows: a table [limits.residual_quantile] with a value of its own ()
+        """,
+    ),
+    "limits that are the mission's": (
+        lambda: noted(
+            checks.default_limits,
+            ("residual_quantile", "margin_under_fades"),
+            required(),
+            {"grid": {"requirement.outage": 0}},
+        ),
+        """
+        (Limit(output='margin_under_fades', least=3.125, most=None, source='requirement.margin'),
+        Limit(output='residual_quantile', least=None, most=1.25e-05, source='requirement.pointing_error'))
+        """,
+    ),
+    "limits that nothing checks": (
+        lambda: "; ".join(
+            checks.unchecked(["margin"], ["margin", "margin_under_fades", "residual_quantile"], required(), [])
+        ),
+        """
+        [limits] leaves out margin_under_fades, so that requirement.margin = 3.125 dB is not checked: a table
+        [limits.margin_under_fades] with least = "3.125 dB" checks it; [limits] leaves out residual_quantile, so
+        that requirement.pointing_error = 12.5 µrad is not checked: a table [limits.residual_quantile] with most =
+        "12.5 µrad" checks it
+        """,
+    ),
+    "a limit of no output": (
+        lambda: noted(checks.limit, "margn", {"least": "3 dB"}, ["margin"]),
+        """
+        limits.margn = "margn" is no output: one of residual_rms, residual_quantile, residual_largest, beyond_share,
+        lost_share, saturated_share, beyond_rate_share, outside_share, margin, margin_under_fades, outage, short,
+        data_rate, beacon_margin, answer_margin, volume, contact_time, optical_volume ("margin")
+        """,
+    ),
+    "a limit of an output that is not kept": (
+        lambda: noted(checks.limit, "margin", {"least": "3 dB"}, ["volume"]),
+        """
+        limits.margin = is a limit of an output that is not kept: "margin" in keep, or this table removed ()
+        """,
+    ),
+    "a limit of nothing": (
+        lambda: noted(checks.limit, "margin", {}, ["margin"]),
+        "limits.margin = has neither least nor most: [limits.margin] with least or most ()",
+    ),
+    "a limit of two that cross": (
+        lambda: noted(checks.limit, "residual_rms", {"least": "12.5 urad", "most": "12.25 urad"}, ["residual_rms"]),
+        """limits.residual_rms.most = "12.25 urad" is not above least: a range that goes up ()""",
+    ),
+    "a limit of two wrong units": (
+        lambda: noted(checks.limit, "data_rate", {"least": "3 dB", "most": 5}, ["data_rate"]),
+        """
+        limits.data_rate.least = "3 dB" is in dB, another kind of quantity: a data rate with its unit; for example
+        least = "5 Mbit/s" (); limits.data_rate.most = 5 is a number without a unit: a data rate with its unit; for
+        example most = "5 Mbit/s" ()
+        """,
+    ),
+    "a limit in its own unit": (
+        lambda: noted(checks.limit, "data_rate", {"least": "622.08 Mbit/s", "most": "2.5 Gbit/s"}, ["data_rate"]),
+        "Limit(output='data_rate', least=622080000.0, most=2500000000.0, source='campaign file')",
+    ),
+    "a limit of a plain number": (
+        lambda: noted(checks.limit, "outage", {"most": 0.0125}, ["outage"]),
+        "Limit(output='outage', least=None, most=0.0125, source='campaign file')",
+    ),
+    "a precision of no output": (
+        lambda: noted(checks.half_width, campaign(precision=SimpleNamespace(output="radus", half_width="1 urad")), []),
+        """
+        precision.output = "radus" is no output: one of residual_rms, residual_quantile, residual_largest,
+        beyond_share, lost_share, saturated_share, beyond_rate_share, outside_share, margin, margin_under_fades,
+        outage, short, data_rate, beacon_margin, answer_margin, volume, contact_time, optical_volume, radius
+        ("radius")
+        """,
+    ),
+    "a precision of the radius without a loop": (
+        lambda: noted(checks.half_width, campaign(precision=SimpleNamespace(output="radius", half_width=0.5)), []),
+        """
+        precision.output = "radius" needs the fine-pointing loop: a table [loop], or another output ();
+        precision.half_width = 0.5 is a number without a unit: an angle with its unit; for example half_width =
+        "0.05 urad" ()
+        """,
+    ),
+    "a precision of what is not kept": (
+        lambda: noted(
+            checks.half_width, campaign(precision=SimpleNamespace(output="outage", half_width=0.0)), ["margin"]
+        ),
+        """
+        precision.output = "outage" is not kept: "outage" in keep, or another output (); precision.half_width = 0.0
+        is not above 0: a number without quotes, above 0; for example half_width = 0.001 ()
+        """,
+    ),
+    "a precision in gigabytes": (
+        lambda: noted(
+            checks.half_width, campaign(precision=SimpleNamespace(output="volume", half_width="0.25 GB")), ["volume"]
+        ),
+        "2000000000.0",
+    ),
+    "a tail beside what it cannot have": (
+        lambda: noted(
+            checks.check_tail, campaign(tail=0), ["a.b", "c"], dict.fromkeys(("realisations", "keep", "precision"))
+        ),
+        """
+        tail = needs the fine-pointing loop: a table [loop] (); inputs.a.b = changes the loop, and a table [tail]
+        needs the same loop in all rows: the mission's own value, or a grid of values (); inputs.c = changes the
+        loop, and a table [tail] needs the same loop in all rows: the mission's own value, or a grid of values ();
+        keep = stands beside [tail], whose rows are single errors: one of the two removed (); precision = stands
+        beside [tail], whose rows are single errors: one of the two removed (); realisations = stands beside [tail],
+        whose rows are single errors: one of the two removed ()
+        """,
+    ),
+    "rows that are all the same": (
+        lambda: noted(checks.check_repeats, campaign(runs=20), False, 20, 24),
+        """
+        runs = makes 24 rows that are all the same: nothing is drawn, and without [loop] there is no noise: runs = 1
+        with sampling = "random", one row for each cell; or [inputs.KEY] with a distribution; or [loop] ()
+        """,
+    ),
+    "rows that are all the same up to a precision": (
+        lambda: noted(checks.check_repeats, campaign(runs=1, precision=0), False, 16, 48),
+        """
+        sampling = makes 48 rows that are all the same: nothing is drawn, and without [loop] there is no noise: runs
+        = 1 with sampling = "random", and no [precision], one row for each cell; or [inputs.KEY] with a
+        distribution; or [loop] ()
+        """,
+    ),
+    "an optimisation of nothing": (
+        lambda: noted(checks.check_minimise, campaign(optimise=SimpleNamespace(variables={}, minimise="-magin"))),
+        """
+        optimise.variables = holds no variable: [optimise.variables.KEY] with low and high (); optimise.minimise =
+        "-magin" is neither a variable of the optimisation nor an output: one of residual_rms, residual_quantile,
+        residual_largest, beyond_share, lost_share, saturated_share, beyond_rate_share, outside_share, margin,
+        margin_under_fades, outage, short, data_rate, beacon_margin, answer_margin, volume, contact_time,
+        optical_volume ("-margin")
+        """,
+    ),
+    "an optimisation of what is no name": (
+        lambda: noted(
+            checks.check_minimise,
+            campaign(
+                optimise=SimpleNamespace(variables={"terminals.leo_aperture": 0}, minimise="terminals.leo_apertures")
+            ),
+        ),
+        """
+        optimise.minimise = "terminals.leo_apertures" is neither a variable of the optimisation nor an output: one
+        of terminals.leo_aperture, residual_rms, residual_quantile, residual_largest, beyond_share, lost_share,
+        saturated_share, beyond_rate_share, outside_share, margin, margin_under_fades, outage, short, data_rate,
+        beacon_margin, answer_margin, volume, contact_time, optical_volume ("terminals.leo_aperture")
+        """,
+    ),
+    "more runs than there are numbers for": (
+        lambda: noted(checks.check_size, 48, 32, 2**28),
+        """
+        precision.at_most = 32 is below the 48 rows of the first round: at least 48 (); runs = makes 32 rows of
+        268435456 runs each in a cell: at most 2^32 = 4294967296 runs: fewer rows or realisations ()
+        """,
+    ),
+    "an input that is no table": (
+        lambda: drawn("communication.transmit_power", "5 W"),
+        """
+        inputs.communication.transmit_power = "5 W" is no table: [inputs.communication.transmit_power] with
+        distribution = "normal" or distribution = "uniform" or distribution = "log-uniform" or distribution =
+        "table" or distribution = "identified" ()
+        """,
+    ),
+    "an input without a distribution": (
+        lambda: drawn("communication.transmit_power", {"mean": "5 W"}),
+        """
+        inputs.communication.transmit_power.distribution = is missing: distribution = "normal" or distribution =
+        "uniform" or distribution = "log-uniform" or distribution = "table" or distribution = "identified" ()
+        """,
+    ),
+    "an input of another distribution": (
+        lambda: drawn("communication.transmit_power", {"distribution": "loguniform"}),
+        """
+        inputs.communication.transmit_power.distribution = "loguniform" is none of the choices: distribution =
+        "normal" or distribution = "uniform" or distribution = "log-uniform" or distribution = "table" or
+        distribution = "identified" ("log-uniform")
+        """,
+    ),
+    "an input that is normal": (
+        lambda: drawn("communication.transmit_power", {"distribution": "normal", "mean": "5 W", "deviation": "250 mW"}),
+        """
+        Draw(key='communication.transmit_power', unit='W', distribution=Normal(mean=5.0, deviation=0.25),
+        drawn_as=None)
+        """,
+    ),
+    "an input that is normal and falls": (
+        lambda: drawn("communication.transmit_power", {"distribution": "normal", "mean": "-5 W", "deviation": "0 W"}),
+        """
+        inputs.communication.transmit_power.mean = "-5 W" is not above 0 W: a power with its unit, above 0 W, at
+        most 1 MW; for example mean = "5 W" (); inputs.communication.transmit_power.deviation = "0 W" is not above 0
+        W: a power with its unit, above 0 W; for example deviation = "5 W" ()
+        """,
+    ),
+    "an input that is mostly none": (
+        lambda: drawn("communication.transmit_power", {"distribution": "normal", "mean": "1 mW", "deviation": "1 MW"}),
+        """
+        inputs.communication.transmit_power = has 65.9 % of its draws not above 0 W or above 1 MW: a smaller
+        deviation, or distribution = "uniform" or "log-uniform" between bounds ()
+        """,
+    ),
+    "an input that is often none": (
+        lambda: drawn("terminals.leo_obscuration", {"distribution": "normal", "mean": 0.94, "deviation": 0.5}),
+        """
+        inputs.terminals.leo_obscuration = has 52.2 % of its draws below 0 or above 0.95: a smaller deviation, or
+        distribution = "uniform" or "log-uniform" between bounds ()
+        """,
+    ),
+    "an input in a range": (
+        lambda: drawn("communication.transmit_power", {"distribution": "log-uniform", "low": "2.5 W", "high": "10 W"}),
+        """
+        Draw(key='communication.transmit_power', unit='W', distribution=LogUniform(low=2.5, high=10.0),
+        drawn_as=None)
+        """,
+    ),
+    "an input in a range that falls": (
+        lambda: drawn("communication.transmit_power", {"distribution": "uniform", "low": "10 W", "high": "10 W"}),
+        """
+        inputs.communication.transmit_power.high = "10 W" is not above low ("10 W"): a range that goes up ()
+        """,
+    ),
+    "an input without a logarithm": (
+        lambda: drawn(
+            "communication.pointing_error", {"distribution": "log-uniform", "low": "0 urad", "high": "10 urad"}
+        ),
+        """
+        inputs.communication.pointing_error.low = "0 urad" is not above 0, so that it has no logarithm: a value
+        above 0, or distribution = "uniform" ()
+        """,
+    ),
+    "an input of a list of values": (
+        lambda: drawn(
+            "conventions.strehl", {"distribution": "table", "values": ["decibel", "ratio"], "weights": [1, 3]}
+        ),
+        """
+        Draw(key='conventions.strehl', unit='', distribution=OneOf(values=(1.0, 2.0), probabilities=(0.25, 0.75),
+        written=('decibel', 'ratio'), is_words=True), drawn_as=None)
+        """,
+    ),
+    "an input of numbers with weights": (
+        lambda: drawn(
+            "communication.transmit_power",
+            {"distribution": "table", "values": ["5 W", "2500 mW", "8 W"], "weights": [0.5, 1.25, 0.75]},
+        ),
+        """
+        Draw(key='communication.transmit_power', unit='W', distribution=OneOf(values=(5.0, 2.5, 8.0),
+        probabilities=(0.2, 0.5, 0.3), written=('5 W', '2500 mW', '8 W'), is_words=False), drawn_as=None)
+        """,
+    ),
+    "an input of a value twice": (
+        lambda: drawn("communication.transmit_power", {"distribution": "table", "values": ["5 W", "5000 mW"]}),
+        """
+        inputs.communication.transmit_power.values = ["5 W", "5000 mW"] has a value twice: each value once, with its
+        weight ()
+        """,
+    ),
+    "an input of values of which two are wrong": (
+        lambda: drawn("communication.transmit_power", {"distribution": "table", "values": ["5 m", "5 W", 4]}),
+        """
+        inputs.communication.transmit_power.values = "5 m" is in "m", another kind of quantity: a power with its
+        unit; for example transmit_power = "5 W" (); inputs.communication.transmit_power.values = 4 is a number
+        without a unit: a power with its unit; for example transmit_power = "4 W" ()
+        """,
+    ),
+    "an input of too few weights": (
+        lambda: drawn(
+            "communication.transmit_power", {"distribution": "table", "values": ["5 W", "6 W"], "weights": [1, 0]}
+        ),
+        """
+        inputs.communication.transmit_power.weights = [1, 0] does not give each value its weight: 2 plain numbers
+        above 0, one for each value ()
+        """,
+    ),
+    "an input of no values": (
+        lambda: drawn("communication.transmit_power", {"distribution": "table", "values": []}),
+        """
+        inputs.communication.transmit_power.values = [] is not a list with something in it: 1 to 1000 values ()
+        """,
+    ),
+    "an input of a word that is solved for": (
+        lambda: drawn("communication.data_rate", {"distribution": "table", "values": ["622.08 Mbit/s", "largest"]}),
+        """
+        inputs.communication.data_rate.values = ["622.08 Mbit/s", "largest"] has a word that is solved for: values,
+        or this word in the mission ()
+        """,
+    ),
+    "an input of words in a range": (
+        lambda: drawn("conventions.strehl", {"distribution": "uniform", "low": 1, "high": 2}),
+        """
+        inputs.conventions.strehl = is not a quantity that takes any value in a range: distribution = "table" with
+        its values, or a grid of them ()
+        """,
+    ),
+    "an input of a list": (
+        lambda: drawn(
+            "scenario.loop_frequencies",
+            {"distribution": "uniform", "low": "1 Hz", "high": "2 Hz"},
+            {**DATA, "scenario": {"loop_frequencies": ["-1 Hz", "2 Hz"]}},
+        ),
+        """
+        inputs.scenario.loop_frequencies = is a list, whose items are drawn each by its own key:
+        scenario.loop_frequencies.1 and scenario.loop_frequencies.2, each with its distribution ()
+        """,
+    ),
+    "an input of a list as one": (
+        lambda: drawn("scenario.pid_frequencies", {"distribution": "uniform", "low": "1 Hz", "high": "2 Hz"}),
+        """
+        Draw(key='scenario.pid_frequencies', unit='Hz', distribution=Uniform(low=1.0, high=2.0), drawn_as=None)
+        """,
+    ),
+    "an input that is identified": (
+        lambda: drawn("communication.transmit_power", {"distribution": "identified"}),
+        """
+        inputs.communication.transmit_power = does not go together with its distribution: [inputs.mirror] with
+        distribution = "identified", or the key of a single value ()
+        """,
+    ),
+    "a mirror that is not": (
+        lambda: drawn("mirror", {"distribution": "normal", "mean": 1, "deviation": 1}),
+        """
+        inputs.mirror = does not go together with its distribution: [inputs.mirror] with distribution =
+        "identified", or the key of a single value ()
+        """,
+    ),
+    "an input that is drawn as another": (
+        lambda: drawn(
+            "communication.transmit_power",
+            {
+                "distribution": "normal",
+                "mean": "5 W",
+                "deviation": "250 mW",
+                "drawn_as": {"distribution": "normal", "mean": "4.5 W", "deviation": "0.5 W"},
+            },
+        ),
+        """
+        Draw(key='communication.transmit_power', unit='W', distribution=Normal(mean=5.0, deviation=0.25),
+        drawn_as=Normal(mean=4.5, deviation=0.5))
+        """,
+    ),
+    "an input that is drawn as a narrow one": (
+        lambda: drawn(
+            "communication.transmit_power",
+            {
+                "distribution": "normal",
+                "mean": "5 W",
+                "deviation": "250 mW",
+                "drawn_as": {"distribution": "normal", "mean": "4.5 W", "deviation": "0.125 W"},
+            },
+        ),
+        """
+        inputs.communication.transmit_power.drawn_as = is too narrow: its weights would have no finite variance: a
+        distribution that reaches as far as the input's own ()
+        """,
+    ),
+    "an input that is drawn as one that is drawn": (
+        lambda: drawn(
+            "communication.transmit_power",
+            {
+                "distribution": "uniform",
+                "low": "5 W",
+                "high": "6 W",
+                "drawn_as": {"distribution": "uniform", "low": "5 W", "high": "6 W", "drawn_as": 0},
+            },
+        ),
+        """
+        inputs.communication.transmit_power.drawn_as = is no distribution that an input can be drawn as: a normal
+        one, for example ()
+        """,
+    ),
+    "warnings of inputs": (
+        lambda: "; ".join(
+            draws.failing(
+                (
+                    Draw("communication.pointing_error", "rad", Normal(1e-6, 1e-6), None),
+                    Draw("communication.transmit_power", "W", Uniform(1.0, 2.0), Normal(2.0, 0.75)),
+                    Draw("mirror", "", None, None),
+                    Draw("requirement.outage", "", Normal(0.5, 0.125), None),
+                ),
+                DATA,
+                200,
+            )
+        ),
+        """
+        15.9 % of the draws of communication.pointing_error are below 0 rad: those rows will fail, and the results
+        will be those of the others; a smaller deviation, or distribution = "uniform" or "log-uniform" between
+        bounds avoids it; 0.38 % of the draws of communication.transmit_power are not above 0 W: those rows will
+        fail, and the results will be those of the others; a smaller deviation, or distribution = "uniform" or
+        "log-uniform" between bounds avoids it; 0.0063 % of the draws of requirement.outage are not above 0 or not
+        below 1: those rows will fail, and the results will be those of the others; a smaller deviation, or
+        distribution = "uniform" or "log-uniform" between bounds avoids it
+        """,
+    ),
+    "inputs in words": (
+        lambda: [
+            (t.key, t.unit, t.distribution)
+            for t in draws.input_texts(
+                (
+                    Draw("a", "W", Normal(2.5, 0.125), Uniform(1.0, 4.0)),
+                    Draw("b", "", OneOf((1.0, 2.0), (0.25, 0.75), ("x", "y"), True), None),
+                    Draw("c", "rad", LogUniform(1e-6, 2.5e-5), None),
+                    Draw("d", "bit/s", OneOf((622.08e6, 1e9), (0.5, 0.5), ("622.08 Mbit/s", "1 Gbit/s"), False), None),
+                ),
+                (),
+            )
+        ],
+        """
+        [('a', 'W', 'normal, mean 2.5 W, deviation 125 mW; drawn as uniform, 1 W to 4 W and weighted'), ('b', '',
+        'one of 1 = x, 2 = y, weights 0.25, 0.75'), ('c', 'rad', 'log-uniform, 1 µrad to 25 µrad'), ('d', 'bit/s',
+        'one of 622.1 Mbit/s, 1 Gbit/s')]
+        """,
+    ),
+    "variables": (
+        lambda: [
+            noted(
+                lambda reader, key, low, high: draws.variable(reader, key, SimpleNamespace(low=low, high=high), DATA),
+                *each,
+            )
+            for each in (
+                ("terminals.leo_aperture", "2.5 cm", "100 mm"),
+                ("fine_pointing.runs", 1, 2),
+                ("terminals.leo_apertur", "1 m", "2 m"),
+                ("communication.data_rate", "622.08 Mbit/s", "1 Gbit/s"),
+            )
+        ],
+        """
+        ["Variable(key='terminals.leo_aperture', unit='m', low=0.025, high=0.1)",
+        'optimise.variables.fine_pointing.runs = is not a quantity that takes any value in a range: the key of a
+        quantity ()', 'optimise.variables.terminals.leo_apertur = is no key of [terminals]: one of leo_aperture,
+        geo_aperture, leo_obscuration, geo_obscuration, leo_name, geo_name (terminals.leo_aperture)',
+        "Variable(key='communication.data_rate', unit='bit/s', low=622080000.0, high=1000000000.0)"]
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_CHECK)
+def test_what_a_check_notes_is_told_in_full(what):
+    call, words = ALL_OF_A_CHECK[what]
+    assert one_line(str(call())) == one_line(words)
+
+
+KEYS = {
+    "the key communication.transmit_power": (
+        lambda: found_or_refused("communication.transmit_power"),
+        "communication.transmit_power transmit_power Communication 'W' None True",
+    ),
+    "the key pointing.lines.misalignment.error": (
+        lambda: found_or_refused("pointing.lines.misalignment.error"),
+        "pointing.lines.misalignment.error error PointingLine 'rad' None True",
+    ),
+    "the key pointing.lines": (
+        lambda: found_or_refused("pointing.lines"),
+        """
+        is a group of named tables and no value: one of body_pointing, orbit_knowledge, misalignment ()
+        """,
+    ),
+    "the key pointing.lines.misaligment.error": (
+        lambda: found_or_refused("pointing.lines.misaligment.error"),
+        """
+        is no key of [pointing.lines]: one of body_pointing, orbit_knowledge, misalignment
+        (pointing.lines.misalignment.error)
+        """,
+    ),
+    "the key scenario.pid_frequencies.2": (
+        lambda: found_or_refused("scenario.pid_frequencies.2"),
+        "scenario.pid_frequencies.2 2 Scenario 'Hz' 2 True",
+    ),
+    "the key scenario.pid_frequencies.3": (
+        lambda: found_or_refused("scenario.pid_frequencies.3"),
+        """
+        is no item of scenario.pid_frequencies, a list of 2: scenario.pid_frequencies.1 or
+        scenario.pid_frequencies.2 ()
+        """,
+    ),
+    "the key scenario.pid_frequencies.02": (
+        lambda: found_or_refused("scenario.pid_frequencies.02"),
+        """
+        is no item of scenario.pid_frequencies, a list of 2: scenario.pid_frequencies.1 or
+        scenario.pid_frequencies.2 ()
+        """,
+    ),
+    "the key communication": (
+        lambda: found_or_refused("communication"),
+        """
+        is a table and no value: one of its keys transmit_power, wavelength, strehl, wavefront_error,
+        pointing_error, distance, transmit_optics_loss, receive_optics_loss, data_rate, tracking_split_loss,
+        implementation_loss, receiver_sensitivity, receiver, code_word, beam, coupling, fading ()
+        """,
+    ),
+    "the key comunication.transmit_power": (
+        lambda: found_or_refused("comunication.transmit_power"),
+        """
+        is no key of the mission: one of name, pointing, terminals, conventions, beacon, answer, communication,
+        requirement, channel, jitter, point_ahead, error_budget, acquisition, orbit, operations, constellation,
+        mirror, amplifier, control, scenario, fine_pointing (communication.transmit_power)
+        """,
+    ),
+    "the key communication.transmit_power.x": (
+        lambda: found_or_refused("communication.transmit_power.x"),
+        "goes on behind communication.transmit_power, which holds a value: the key without it ()",
+    ),
+    "the key fine_pointing.runs": (
+        lambda: found_or_refused("fine_pointing.runs"),
+        "fine_pointing.runs runs FinePointing '' None False",
+    ),
+    "the key orbit.leo.inclination": (
+        lambda: found_or_refused("orbit.leo.inclination"),
+        "orbit.leo.inclination inclination OrbitTable 'rad' None True",
+    ),
+    "the key terminals.leo_name": (
+        lambda: found_or_refused("terminals.leo_name"),
+        "terminals.leo_name leo_name Terminals '' None False",
+    ),
+    "the key requirement.outage": (
+        lambda: found_or_refused("requirement.outage"),
+        "requirement.outage outage Requirement '' None True",
+    ),
+    "the key operations.optical.stations.a.availability.13": (
+        lambda: found_or_refused("operations.optical.stations.a.availability.13"),
+        "is no key of [operations.optical.stations]: a table that the mission has ()",
+    ),
+    "the key constellation.relays": (
+        lambda: found_or_refused("constellation.relays"),
+        "is a group of named tables and no value: one of east, west ()",
+    ),
+    "the key zzz": (
+        lambda: found_or_refused("zzz"),
+        """
+        is no key of the mission: one of name, pointing, terminals, conventions, beacon, answer, communication,
+        requirement, channel, jitter, point_ahead, error_budget, acquisition, orbit, operations, constellation,
+        mirror, amplifier, control, scenario, fine_pointing ()
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", KEYS)
+def test_a_key_is_found_with_its_table_and_unit_or_refused_in_full(what):
+    call, words = KEYS[what]
+    assert one_line(str(call())) == one_line(words)
