@@ -1,7 +1,7 @@
 """Statistics of rows: quantiles against those of NumPy, and every interval against how often it holds the truth."""
 
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +13,7 @@ from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.records import Chunk, Failed, Limit, Progress
 from microrad.campaign.statistics import summary
 from microrad.campaign.statistics.cell import CellRows, _missed
+from microrad.campaign.statistics.interim import _order
 from microrad.campaign.statistics.intervals import (
     Moments,
     _tails,
@@ -28,6 +29,7 @@ from microrad.campaign.statistics.intervals import (
 )
 from microrad.campaign.statistics.summary import _sample, progress
 from microrad.core.arrays import Floats
+from microrad.core.intervals import student
 from microrad.mirror import Variant
 from truths import philox
 
@@ -506,3 +508,139 @@ def test_values_that_are_all_the_same_have_one_bin_about_them_whatever_their_sig
     edges, counts = histogram(np.full(3, value), np.ones(3))
     assert edges == pytest.approx([value - 2e-3, value + 2e-3], abs=1e-12)
     assert counts.tolist() == [3.0]
+
+
+VALUES = np.array([2.0, math.nan, 5.0, -1.0, 7.0, 5.0])
+WEIGHTS = np.array([0.5, 3.0, 1.25, 2.0, 0.75, 0.25])
+
+
+def ends(found) -> list[float]:
+    return [found.value, found.low, found.high, found.confidence]
+
+
+def test_weighted_moments_leave_out_what_is_not_known_with_its_weight() -> None:
+    found, known = moments(VALUES, WEIGHTS), ~np.isnan(VALUES)
+    x, w = VALUES[known], WEIGHTS[known]
+    mean = np.average(x, weights=w)
+    off = x - mean
+    wanted = (5, w.sum(), (w**2).sum(), mean, (w * off**2).sum(), (w**2 * off).sum(), ((w * off) ** 2).sum(), -1.0, 7.0)
+    assert astuple(found) == pytest.approx(wanted, rel=1e-12)
+    variance = (w * off**2).sum() / (w.sum() - (w**2).sum() / w.sum())
+    assert (found.variance, found.deviation) == pytest.approx((variance, math.sqrt(variance)), rel=1e-12)
+    assert found.mean_variance == pytest.approx(((w * off) ** 2).sum() / w.sum() ** 2 * 5 / 4, rel=1e-12)
+
+
+def test_an_endless_value_leaves_its_ends_and_no_spread() -> None:
+    found = moments(np.array([2.0, math.inf, math.nan, 3.0]))
+    assert (found.count, found.weight, found.mean, found.least, found.most) == (3, 3.0, math.inf, 2.0, math.inf)
+    assert math.isnan(found.spread) and math.isnan(found.variance)
+
+
+def test_the_mean_of_weighted_rows_has_the_spread_of_its_blocks_where_there_are_any() -> None:
+    rows = moments(VALUES, WEIGHTS)
+    half = student(0.9, 4) * math.sqrt(rows.mean_variance)
+    assert ends(mean_interval(rows, 0.9)) == pytest.approx([rows.mean, rows.mean - half, rows.mean + half, 0.9])
+    blocks = moments(np.array([1.0, 4.0, 2.5]))
+    half = student(0.9, 2) * math.sqrt(2.25 / 3.0)
+    assert ends(mean_interval(rows, 0.9, blocks)) == pytest.approx([rows.mean, rows.mean - half, rows.mean + half, 0.9])
+    alone = ends(mean_interval(rows, 0.9, moments(np.array([1.0]))))
+    assert alone[0] == rows.mean and np.isnan(alone[1:3]).all()
+
+
+@pytest.mark.parametrize(
+    ("hits", "weights", "found"),
+    [
+        ([1, 0, 0, 0, 0, 0], [0.25, 1.5, 1.0, 2.0, 0.5, 0.75], [0.04166667, 0.001913722, 0.1875991, 0.9]),
+        ([0, 1, 1, 1, 1, 1], [0.25, 1.5, 1.0, 2.0, 0.5, 0.75], [0.9583333, 0.8124009, 0.9980863, 0.9]),
+        ([1, 0, 1, 0, 1, 0], [2.0, 1.0, 3.0, 0.5, 2.5, 1.0], [0.5833333, 0.2098502, 0.8950893, 0.9]),
+        ([1, 1, 1], [2.0, 1.0, 4.0], [1.0, 0.2769591, 1.0, 0.9]),
+        ([0, 0, 0], [2.0, 1.0, 4.0], [0.0, 0.0, 0.7230409, 0.9]),
+        ([1, 0, 1, 1], [1.0, 1.0, 1.0, 1.0], [0.75, 0.2486046, 0.9872585, 0.9]),
+    ],
+)
+def test_a_weighted_share_is_told_by_its_rarer_side(hits, weights, found) -> None:
+    share = share_interval(moments(np.array(hits, dtype=float), np.array(weights)), 0.9)
+    assert ends(share) == pytest.approx(found, rel=1e-6)
+
+
+def test_a_share_of_nothing_is_not_known() -> None:
+    assert np.isnan(ends(share_interval(Moments(), 0.9))[:3]).all()
+    assert ends(proportion_interval(2.5, 8.0, 0.9)) == pytest.approx([0.3125, 0.07631499, 0.6571747, 0.9], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("probability", "found"),
+    [
+        (0.05, [9.0, 4.0, 25.0, 0.8]),
+        (0.3, [144.0, 36.0, 324.0, 0.8]),
+        (0.5, [400.0, 169.0, 676.0, 0.8]),
+        (0.9, [1156.0, 1024.0, 1521.0, 0.8]),
+        (0.99, [1521.0, 1444.0, math.nan, 0.8]),
+    ],
+)
+def test_a_quantile_of_rows_of_other_weights_has_its_own_ends(probability, found) -> None:
+    rows = ordered(np.arange(40.0) ** 2, 0.25 + np.arange(40.0) % 7)
+    assert ends(quantile_interval(rows, probability, 0.8)) == pytest.approx(found, nan_ok=True)
+
+
+def test_an_output_of_weighted_blocks_has_all_of_its_summary() -> None:
+    rows, margin = np.array([0.0, 1, 4, 5, 6, 7, 9]), np.array([3.0, 5.0, 4.0, math.nan, 8.0, 2.0, 6.0])
+    weight = np.array([0.5, 2.0, 1.0, 1.5, 0.75, 1.25, 3.0])
+    given = {"row": rows, "weight": weight, "margin": margin}
+    found = output_summary(OUTPUTS["margin"], given, (0.25, 0.75), 0.9, 2)
+    known = moments(margin, weight)
+    assert (found.name, found.unit, found.rows, found.least, found.most) == ("margin", "dB", 6, 2.0, 8.0)
+    assert found.meaning == OUTPUTS["margin"].meaning
+    assert found.deviation == known.deviation
+    # blocks of two rows from row 0: rows 0 and 1, 4 and 5 (one of which has failed), 6 and 7; that of 9 is not whole
+    means = moments(np.array([(1.5 + 10.0) / 2.5, 4.0, (6.0 + 2.5) / 2.0]))
+    assert ends(found.mean) == pytest.approx(ends(mean_interval(known, 0.9, means)), rel=1e-12)
+    assert [q.value for q in found.quantiles.values()] == [4.0, 6.0]
+    assert list(found.quantiles) == [0.25, 0.75]
+    assert found.counts.sum() == pytest.approx(8.5) and found.counts[-1] == 0.75 and found.counts[0] == 1.25
+    assert (found.edges[0], found.edges[-1], found.edges.size) == (2.0, 8.0, 41)
+
+
+def test_a_value_on_an_edge_is_in_the_bin_above_it_and_the_last_in_the_last() -> None:
+    edges, counts = histogram(
+        np.array([1.0, 2.0, 2.0, 3.5, 5.0, math.nan]), np.array([0.5, 1.0, 0.25, 2.0, 4.0, 9.0]), 4
+    )
+    assert (edges.tolist(), counts.tolist()) == ([1.0, 2.0, 3.0, 4.0, 5.0], [0.5, 1.25, 2.0, 4.0])
+
+
+def test_a_precision_is_told_with_every_number_in_the_unit_of_its_output() -> None:
+    campaign = a_campaign(("data_rate", "outage"), half_width=2.5e6)
+    campaign.table.precision = SimpleNamespace(output="data_rate", quantile=0.975, confidence=0.8)
+    rate = 622.08e6 + 1e5 * np.arange(400.0)
+    chunk = a_chunk(0, range(400), data_rate=rate, outage=rate / 1e12)
+    assert CellRows(campaign, 0, [chunk]).precision_words() == (
+        "97.5 % quantile of data_rate with distance = 40000 km: 661 Mbit/s, 660.6 Mbit/s to 661.5 Mbit/s at 80 % "
+        "confidence; as precise as asked for (± 2.5 Mbit/s)."
+    )
+    campaign.half_width, campaign.table.precision.output = 1e-7, "outage"
+    assert CellRows(campaign, 1, [chunk]).precision_words() == (
+        "97.5 % quantile of outage: 0.000661, 0.0006606 to 0.0006615 at 80 % confidence; NOT "
+        "as precise as asked for (± 1e-07)."
+    )
+
+
+def test_the_cell_that_misses_least_comes_first_and_one_without_a_row_last() -> None:
+    def cell(rows, failed, missed):
+        return SimpleNamespace(rows=rows, failed=failed, missed=SimpleNamespace(value=missed))
+
+    cells = [cell(4, 4, 0.0), cell(4, 1, math.nan), cell(4, 0, 0.5), cell(9, 8, 0.25)]
+    assert sorted(range(4), key=lambda k: _order(cells[k])) == [3, 2, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("rank", "probability", "few", "many"),
+    [
+        (3, 0.4, 0.7464352, 0.6161208),
+        (5, 0.4, 0.9962403, 0.04079052),
+        (0, 0.3, 0.2374178, 1.0),
+        (6, 0.3, 1.0, 0.007798596),
+    ],
+)
+def test_the_tails_of_a_rank_go_by_the_rows_that_its_weights_are_worth(rank, probability, few, many) -> None:
+    rows = ordered(np.arange(6.0), np.array([2.0, 0.5, 1.0, 3.0, 0.25, 1.25]))
+    assert _tails(rows, rank, probability) == pytest.approx((few, many), rel=1e-6)
