@@ -8,7 +8,15 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from microrad.campaign.records import Sensitivity
-from microrad.campaign.statistics.sensitivity import MOST_ROWS, _bins, _inside, _ratio, sensitivity
+from microrad.campaign.statistics.sensitivity import (
+    MOST_ROWS,
+    _bins,
+    _inside,
+    _product_measure,
+    _ratio,
+    _terms,
+    sensitivity,
+)
 from microrad.core.arrays import Floats
 from truths import philox
 
@@ -229,3 +237,97 @@ def test_it_is_the_same_each_time_and_looks_at_no_more_rows_than_it_says() -> No
     assert whole.rows == MOST_ROWS
     assert whole == of(x[:MOST_ROWS], y[:MOST_ROWS])
     assert whole != of(x[500:], y[500:])
+
+
+def three(found) -> list[float]:
+    return [found.value, found.low, found.high]
+
+
+def test_indices_of_inputs_of_unlike_sizes_of_which_one_is_held_and_two_rows_lost() -> None:
+    x = philox(31).random((120, 3))
+    inputs = {"a": 2.0 + x[:, 0], "b": np.floor(4.0 * x[:, 1]), "c": 1e-6 * x[:, 2] ** 2, "held": np.full(120, 7.0)}
+    y = 3.0 * inputs["a"] ** 2 - inputs["b"] + 2e6 * inputs["a"] * inputs["c"]
+    y[[5, 17]] = math.nan, math.inf
+    found = sensitivity(inputs, y, "margin", 0.8)
+    assert (found.output, found.rows, found.note) == ("margin", 118, "")
+    first = {
+        "a": [0.8773943, 0.8517273, 0.9030613],
+        "b": [0.01657114, 0.0, 0.06152292],
+        "c": [0.2095269, 0.1048146, 0.3142392],
+        "held": [0.0, 0.0, 0.0],
+    }
+    total = {
+        "a": [0.8519299, 0.8347989, 0.8690609],
+        "b": [0.05146815, 0.04283435, 0.06010194],
+        "c": [0.09787038, 0.08346321, 0.1122775],
+        "held": [0.0, 0.0, 0.0],
+    }
+    ranks = {
+        "a": [0.939376, 0.9200341, 0.9541513],
+        "b": [-0.06624099, -0.1838596, 0.05324778],
+        "c": [0.334502, 0.2213604, 0.438758],
+        "held": [math.nan, math.nan, math.nan],
+    }
+    for wanted, told in ((first, found.first), (total, found.total), (ranks, found.rank_correlation)):
+        assert list(told) == list(inputs)
+        for key, numbers in wanted.items():
+            assert three(told[key]) == pytest.approx(numbers, rel=1e-5, abs=1e-9, nan_ok=True)
+            assert told[key].confidence == 0.8
+    assert found.surrogate_q2 == pytest.approx(1.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "y", "note", "rows"),
+    [
+        ({}, np.arange(100.0), "no inputs are drawn", 100),
+        ({"a": np.arange(63.0)}, np.arange(63.0), "63 good rows are too few to say what matters: 64 are needed", 63),
+        ({"a": np.arange(70.0)}, np.full(70, -2.5), "the output is the same in all rows", 70),
+        (
+            {"a": np.append(np.arange(63.0), [math.nan, math.inf])},
+            *(np.arange(65.0), "63 good rows are too few to say what matters: 64 are needed", 63),
+        ),
+    ],
+)
+def test_of_rows_that_say_nothing_no_index_is_told(inputs, y, note, rows) -> None:
+    found = sensitivity(inputs, y, "margin")
+    assert (found.output, found.note, found.rows) == ("margin", note, rows)
+    assert found.first == found.total == found.rank_correlation == {} and math.isnan(found.surrogate_q2)
+
+
+def test_without_totals_it_is_said_which_inputs_go_together_or_that_none_varies() -> None:
+    x = philox(33).random((200, 2))
+    inputs = {"held": np.full(200, 3.0), "a": x[:, 0], "b": x[:, 1], "c": x[:, 1] - 0.25 * x[:, 0]}
+    found = sensitivity(inputs, x[:, 0] + x[:, 1], "y")
+    assert found.total == {} and math.isnan(found.surrogate_q2)
+    assert found.note == "no total indices: b and c are not independent (rank correlation 0.97)"
+    still = sensitivity({"held": np.full(200, 3.0)}, x[:, 0], "y")
+    assert (still.note, three(still.first["held"])) == ("no total indices: no input varies", [0.0, 0.0, 0.0])
+    assert np.isnan(three(still.rank_correlation["held"])).all()
+
+
+@pytest.mark.parametrize(
+    ("most", "count", "terms", "ends"),
+    [
+        ([2, 1], 9, [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (2, 1)], [3, 5, 6]),
+        ([2, 1], 5, [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1)], [3, 5]),
+        ([1, 1, 1], 6, [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [4]),
+        ([3], 2, [(0,), (1,)], [2]),
+        ([3, 3], 2, [(0, 0)], [1]),
+    ],
+)
+def test_terms_come_by_their_degree_as_far_as_whole_degrees_fit(most, count, terms, ends) -> None:
+    found, upto = _terms(most, count)
+    assert ([tuple(each) for each in found.tolist()], upto) == (terms, ends)
+    assert found.shape == (len(terms), len(most))
+
+
+def test_means_over_independent_inputs_are_products_of_those_of_each() -> None:
+    marginals = [np.array([[1.0, 0.5], [0.5, 2.0]]), np.array([[3.0, -1.0], [-1.0, 4.0]]), np.array([[5.0]])]
+    degrees = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    whole, others, averaged = _product_measure(marginals, degrees)
+    a, b = (np.array([[m[i, j] for j in d] for i in d]) for m, d in zip(marginals, degrees.T[:2], strict=False))
+    assert_allclose(whole, a * b * 5.0)
+    assert_allclose(others, [b * 5.0, a * 5.0, a * b])
+    assert_allclose(averaged[1], [1.0, 0.5, 1.0, 0.5])
+    assert_allclose(averaged[2], [3.0, 3.0, -1.0, -1.0])
+    assert_allclose(averaged[0], averaged[1] * averaged[2] * 5.0)

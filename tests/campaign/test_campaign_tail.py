@@ -459,3 +459,115 @@ def test_the_worth_of_a_tail_is_that_of_its_smallest_known_probability() -> None
     assert tails._effective(band, {1.0: known}) == 7.0
     assert tails._effective(band, {0.05: known}) == 9.0
     assert math.isnan(tails._effective(band, {0.2: unknown})) and math.isnan(tails._effective(band, {}))
+
+
+ROWS = np.array([[1.0, 0.75, 0.5, 0.25, 0, 0], [1.0, 1.0, 0.625, 0.125, 0.125, 0], [1.0, 0.5, 0.25, 0.25, 0, 0]])
+RADII = np.array([0.0, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0])
+DRAWS = np.array([5.0, 1.0, 9.0, 2.5, 7.0, 3.0, 12.0])
+LOG_WEIGHTS = np.log([0.5, 2.0, 0.125, 1.5, 0.25, 1.0, 0.0625])
+
+
+def three(found: Interval) -> list[float]:
+    return [found.value, found.low, found.high]
+
+
+def test_the_tail_of_three_rows_has_every_number_of_its_definition() -> None:
+    found = tail_of_time(ROWS.sum(axis=0), (ROWS**2).sum(axis=0), 3, RADII, (0.5, 0.2, 1e-3), 0.9)
+    assert found.radius_rad.tolist() == [0.0, 1.0, 2.0, 4.0, 7.0, 11.0]
+    assert found.survival.tolist() == pytest.approx([1.0, 0.75, 0.4583333, 0.2083333, 0.04166667, 0.0], rel=1e-6)
+    assert found.low.tolist() == pytest.approx(
+        [0.1707676, 0.1707676, 0.1375754, 0.09701971, 4.813426e-06, 0.0], rel=1e-6
+    )
+    assert found.high.tolist() == pytest.approx([1.0, 0.9955767, 0.8080073, 0.3658819, 0.3658819, 0.3658819], rel=1e-6)
+    wanted = {
+        0.5: [1.862782, math.nan, 3.357049],
+        0.2: [4.103293, math.nan, math.nan],
+        0.001: [10.92117, 5.588594, math.nan],
+    }
+    for probability, radius in wanted.items():
+        assert three(found.wanted[probability]) == pytest.approx(radius, rel=1e-6, nan_ok=True)
+        assert found.wanted[probability].confidence == 0.9
+    assert found.effective_runs == pytest.approx(23.0, rel=1e-6)
+    assert found.method == "share of the time of 3 rows, which are independent"
+    assert (found.beyond, found.variance, found.confidence) == ({}, {}, 0.9)
+
+
+def test_the_tail_of_seven_weighted_draws_has_every_number_of_its_definition() -> None:
+    found = tail_weighted(DRAWS, LOG_WEIGHTS, (0.3, 0.02, 1e-6), 0.9, (0.5, 3.0, 8.0, 20.0))
+    assert found.radius_rad.tolist() == sorted(DRAWS)
+    assert found.survival.tolist() == pytest.approx(
+        [1.0, 0.4910714, 0.2767857, 0.1339286, 0.0625, 0.02678571, 0.008928571], rel=1e-6
+    )
+    assert found.low.tolist() == pytest.approx(
+        [0.1627038, 0.1627038, 0.07312718, 0.03209984, 0.01212384, 0.00310045, 0.0001687703], rel=1e-6
+    )
+    assert found.high.tolist() == pytest.approx(
+        [1.0, 1.0, 0.8641637, 0.4302958, 0.2129632, 0.1035197, 0.04723505], rel=1e-6
+    )
+    wanted = {
+        0.3: [2.934911, 0.8142756, 6.107992],
+        0.02: [9.886991, 6.054901, math.nan],
+        1e-06: [math.nan, math.nan, math.nan],
+    }
+    for probability, radius in wanted.items():
+        assert three(found.wanted[probability]) == pytest.approx(radius, rel=1e-6, nan_ok=True)
+    beyond = {
+        0.5: [1.0, 0.1627038, 1.0],
+        3.0: [0.1339286, 0.03209984, 0.8641637],
+        8.0: [0.02678571, 0.00310045, 0.2129632],
+        20.0: [0.0, 0.0, 0.04723505],
+    }
+    for error, share in beyond.items():
+        assert three(found.beyond[error]) == pytest.approx(share, rel=1e-6)
+    shares = {0.5: 5.4375 / 7.0, 3.0: 0.9375 / 7.0, 8.0: 0.1875 / 7.0, 20.0: 0.0}
+    squares = {0.5: 7.58203125, 3.0: 0.33203125, 8.0: 0.01953125, 20.0: 0.0}
+    for error, variance in found.variance.items():
+        assert variance == pytest.approx((squares[error] / 7.0 - shares[error] ** 2) / 6.0, rel=1e-9, abs=1e-15)
+    assert found.effective_runs == pytest.approx(75.46154, rel=1e-6)
+    assert found.method == "importance sampling of the noise in 7 runs"
+
+
+@pytest.mark.parametrize(
+    ("sigma", "radius", "level", "slope"),
+    [
+        ((2.0,), 5.0, 4.388501, 1.411372),
+        ((2.0, 0.5), 5.0, 4.351849, 1.412883),
+        ((2.0, 2.0), 5.0, 25.0 / 8.0, 5.0 / 4.0),
+        ((0.25, 0.125), 0.75, 5.753821, 13.17528),
+    ],
+)
+def test_a_level_has_its_slope_and_leads_back_to_its_radius(sigma, radius, level, slope) -> None:
+    found = importance_sampling.level_of(np.array([radius]), np.array(sigma))
+    assert [float(each[0]) for each in found] == pytest.approx([level, slope], rel=1e-6)
+    back = importance_sampling.radius_of(np.array([level, 0.25 * level]), np.array(sigma))
+    assert back[0] == pytest.approx(radius, rel=1e-6) and back[1] < back[0]
+
+
+def test_levels_are_drawn_with_the_density_of_all_three_shares() -> None:
+    by = importance_sampling.Proposal(0, np.zeros((1, 1, 2)), np.zeros((1, 1, 2)), np.array([2.0, 0.5]), 3.0, 7.0)
+    density = by.log_density(np.array([0.0, 2.9999, 3.0, 6.9999, 7.0, 9.0]))
+    assert density.tolist() == pytest.approx(
+        [-2.085668, -3.147261, -0.4416576, -2.521926, -4.502562, -6.502562], rel=1e-6
+    )
+    unit, log_weight = importance_sampling.drawn(by, 11, 128)
+    assert unit.shape == (2, LANES) and log_weight.shape == (LANES,)
+    level, _ = importance_sampling.level_of(np.hypot(2.0 * unit[0], 0.5 * unit[1]), by.sigma_rad)
+    np.testing.assert_allclose(log_weight, -level - by.log_density(level), rtol=1e-9, atol=1e-9)
+    later, weights = importance_sampling.drawn(by, 11, 130)
+    np.testing.assert_array_equal(later[:, :-2], unit[:, 2:])
+    np.testing.assert_array_equal(weights[:-2], log_weight[2:])
+    still = importance_sampling.drawn(replace(by, end=0.0), 11, 128)
+    assert not np.any(still[0]) and still[0].shape == (2, LANES) and not np.any(still[1])
+
+
+def test_levels_cover_two_deviations_about_the_error_less_what_lines_make() -> None:
+    pilot = np.array([1.0, -2.0, 3.0, -0.5])
+    straight = np.array([1.5, -2.5, 2.0, -1.0])
+    begin, end = importance_sampling._levels(pilot, straight, 0.75, 6.0, np.array([2.0, 0.5]))
+    square, together = np.mean(pilot**2), np.mean(pilot * straight)
+    at, scatter = 6.0 * together / square, math.sqrt(np.mean(straight**2) - together**2 / square)
+    ends = importance_sampling.level_of(np.array([at - 2.0 * scatter - 0.75, at + 2.0 * scatter]), np.array([2.0, 0.5]))
+    assert (begin, end) == pytest.approx((ends[0][0] - 0.25, ends[0][1] + 1.0), rel=1e-9)
+    far = importance_sampling._levels(pilot, straight, 0.75, 600.0, np.array([2.0, 0.5]))
+    assert far == pytest.approx((45.75, 47.0))
+    assert importance_sampling._levels(pilot, -straight, 0.75, 6.0, np.array([2.0, 0.5]))[0] == 0.0
