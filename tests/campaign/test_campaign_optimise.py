@@ -1013,3 +1013,231 @@ def test_a_variable_has_its_unit_and_the_range_it_was_searched_in():
     assert said.startswith("least x0: 500 mm\n")
     assert re.search(r"\nx0 +500 mm +10 mm to 2 m\n", said)
     assert re.search(r"\nx0 +0\.5 +0 to 1\n", optimum_text(found_with()))
+
+
+RATE = Limit("data_rate", None, 622.08e6, "test")
+BOTH = Limit("residual_rms", 2.5e-6, 12.5e-6, "test")
+
+
+def kept(excess, share=0.5, limit=MARGIN, high=1.0):
+    return Kept(limit, excess, excess, Interval(share, 0.0, high, 0.95))
+
+
+def test_a_limit_in_words_has_each_side_in_its_unit():
+    said = [kept(0.0, limit=limit).wanted for limit in (MARGIN, RATE, BOTH, Limit("outage", None, 0.0125, ""))]
+    assert said == [
+        "margin >= 3 dB",
+        "data_rate <= 622.1 Mbit/s",
+        "residual_rms >= 2.5 µrad and <= 12.5 µrad",
+        "outage <= 0.0125",
+    ]
+
+
+def test_weighted_rows_of_which_one_failed_judge_a_candidate_by_the_row_that_decides():
+    """Of two limits the second has two sides; a row that failed has missed all, and weighs what it weighs."""
+    asked = problem(
+        variables=(Variable("a", "W", 1.0, 2.0), Variable("b", "m", 1.0, 2.0)),
+        minimise="-data_rate",
+        limits=(Limit("margin", 3.0, None, ""), Limit("data_rate", 2.0, 8.0, "")),
+        confidence=0.7,
+    )
+    columns = {
+        "margin": np.array([4.0, 2.5, 3.5, math.nan, 7.0]),
+        "data_rate": np.array([5.0, 7.0, 1.75, 6.0, 9.5]),
+        "weight": np.array([1.0, 0.5, 2.0, 0.25, 1.25]),
+    }
+    found = judged(asked, {"a": 1.5, "b": 1.25}, columns)
+    assert found.values == {"a": 1.5, "b": 1.25} and found.refused == ""
+    assert found.cost == pytest.approx((5.0 + 3.5 + 3.5 + 1.5 + 11.875) / 5.0, rel=1e-12)
+    margin, rate = found.kept
+    # 30 % of the weight of 5 may miss: those of the failed row and of 2.5 dB are 15 %, and 3.5 dB is the next
+    assert (margin.value, margin.excess, margin.holds) == (3.5, 0.5, True)
+    # 9.5 misses by 1.5 and 1.75 by 0.25: 25 % and 40 % more, so the second of them decides
+    assert (rate.value, rate.excess, rate.holds) == (1.75, -0.25, False)
+    assert not found.feasible and not Candidate({}, 1.0, (margin,), "refused").feasible
+    assert margin.agrees(margin.share.high) and not margin.agrees(margin.share.high + 1e-9)
+    assert (asked.cost_name, asked.cost_unit, asked.sign) == ("data_rate", "bit/s", -1.0)
+    assert (problem(minimise="x0").cost_unit, problem(minimise="x0").sign) == ("", 1.0)
+
+
+def test_a_candidate_whose_cost_no_row_has_is_refused():
+    asked = problem(minimise="data_rate", limits=(), confidence=0.5)
+    found = judged(asked, {"x0": 0.5}, {"data_rate": np.array([math.nan, math.nan])})
+    assert (found.refused, found.kept, found.feasible) == ("no row has a data_rate", (), False)
+    assert judged(asked, {"x0": 0.5}, {"data_rate": np.array([math.nan, 2.0])}).cost == 2.0
+
+
+def searching(evaluate=None, **changes):
+    changes = {"limits": (MARGIN, RATE), "variables": unit_cube(2), "evaluations": 40} | changes
+    return search._Search(problem(**changes), evaluate, quiet)
+
+
+def test_costs_and_excesses_are_told_over_their_scales_and_cut_off():
+    of = searching(minimise="-x0")
+    of.cost_scale, of.scales = 4.0, np.array([2.0, 1e6])
+    one = Candidate({"x0": 3.0}, 3.0, (kept(-3.0, 0.25), kept(2e6, 0.75)))
+    assert (of.cost(one), of.excess(one).tolist(), of.violation(one)) == (-0.75, [-1.5, 2.0], 1.5)
+    assert of.score(one) == -0.75 + 10.0 * 1.5
+    both = Candidate({"x0": 3.0}, 1e9, (kept(-3.0, 0.25), kept(-2e6, 0.75)))
+    assert (of.cost(both), of.violation(both)) == (-1e6, 2.5)
+    far = Candidate({}, -1e9, (kept(-1e9), kept(math.inf)))
+    assert (of.cost(far), of.excess(far).tolist()) == (1e6, [-10.0, 10.0])
+    assert of._order(one) == (1.5, -1.0, -3.0)
+    assert of._order(Candidate({}, 3.0, (kept(0.0), kept(1.0)))) == (0.0, 0.0, -3.0)
+
+
+def test_the_best_keeps_all_limits_at_the_least_cost_else_misses_them_least_with_the_larger_share():
+    of = searching()
+    places = [np.array([0.1 * k, 0.0]) for k in range(5)]
+
+    def best(*candidates):
+        of.known = {bytes([k]): each for k, each in enumerate(zip(places, candidates, strict=False))}
+        return of.best()
+
+    good = [Candidate({}, cost, (kept(0.0), kept(1.0))) for cost in (3.0, 2.0, 4.0)]
+    missed = Candidate({}, 0.5, (kept(-0.25, 0.75), kept(1.0)))
+    alike = Candidate({}, 0.75, (kept(-0.25, 0.875), kept(1.0)))
+    refused = Candidate({}, math.nan, (), "no mission")
+    assert best(good[0], missed, good[1], refused, good[2]) is good[1]
+    assert of._so_far() == "best x0 2"
+    assert best(missed, refused, alike) is alike
+    assert of._so_far() == "no candidate keeps the limits yet"
+    assert best(refused) is None and of._so_far() == "no candidate keeps the limits yet"
+    assert [of.trace, of.accepted] == [(refused,), []]
+
+
+def test_searches_set_out_from_the_most_promising_places_that_are_not_close_together():
+    of = searching(limits=())
+    far = 0.15 * math.sqrt(2.0)
+    places = [(0.5, 0.5), (0.5, 0.5 + 0.99 * far), (0.5, 0.5 - 1.01 * far), (0.0, 0.0), (0.02, 0.01)]
+    costs = [3.0, 1.0, 2.0, 5.0, 4.0]
+    for number, (place, cost) in enumerate(zip(places, costs, strict=True)):
+        of.known[bytes([number])] = np.array(place), Candidate({}, cost, ())
+    assert [tuple(each) for each in of.starts()] == [places[1], places[2], places[4]]
+
+
+def test_a_refused_place_is_told_its_neighbours_numbers_and_how_far_that_is():
+    def evaluate(x):
+        if x[0] > 0.5:
+            raise CampaignError("too much")
+        return {"margin": np.full(4, 3.0 + x[0]), "data_rate": np.full(4, 600e6 + 1e7 * x[1])}
+
+    of = searching(evaluate, confidence=0.5)
+    of.cost_scale, of.scales = 2.0, np.array([0.5, 1e7])
+    near = of._numbers(np.array([0.4, 0.5]))
+    of._numbers(np.array([0.1, 0.25]))
+    assert near.tolist() == pytest.approx([0.2, 0.8 - 1e-4, 1.708 - 1e-4], abs=1e-9)
+    away = math.hypot(0.3, 0.1)
+    told = of._numbers(np.array([0.7, 0.6]))
+    wanted = [0.2 + 10.0 * away, 0.8 - 1e-4 - away, 1.708 - 1e-4 - away]
+    assert told.tolist() == pytest.approx(wanted, abs=1e-9)
+    assert told.tolist() == np.round(told, 9).tolist()
+    refused = of.trace[-1]
+    assert (refused.refused, refused.values, refused.kept) == ("too much", {"x0": 0.7, "x1": 0.6}, ())
+    assert math.isnan(refused.cost) and len(of.accepted) == 2
+
+
+def test_no_candidate_is_looked_at_twice_nor_beyond_the_evaluations():
+    looked, told = [], []
+
+    def evaluate(x):
+        looked.append(x.tolist())
+        return {"margin": np.full(4, 5.0)}
+
+    of = search._Search(problem(limits=(), evaluations=2), evaluate, lambda *what: told.append(what))
+    first = of.at(np.array([0.12341]))
+    assert of.at(np.array([0.12344])) is first is not of.at(np.array([-3.0]))
+    assert looked == [[0.1234], [0.0]]
+    assert told == [(1, 2, "best x0 0.1234"), (2, 2, "best x0 0")]
+    with pytest.raises(search._SpentError):
+        of.at(np.array([0.9]))
+    assert of.at(np.array([0.0])) is of.trace[1]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "bounds", "wide"),
+    [
+        ([1.0, 2.0, 4.0, 8.0, 16.0], (), 6.0),
+        ([5.0, 5.0, 5.0, 5.0, 7.5], (), 2.5),  # the quartiles agree, and the extremes do not
+        ([3.0, math.nan, math.inf, 3.0], (-8.0, 2.0), 8.0),
+        ([-9.0, -9.0], (2.0,), 9.0),
+        ([0.0], (), 1.0),
+        ([], (0.25,), 0.25),
+        ([math.nan], (), 1.0),
+    ],
+)
+def test_what_is_wide_is_the_middle_half_else_all_else_the_size(numbers, bounds, wide):
+    assert search._spread(numbers, bounds) == wide
+
+
+def test_scales_are_those_of_cost_and_of_each_limit_over_the_range():
+    def evaluate(x):
+        return {"margin": np.full(4, 8.0 * x[0]), "data_rate": np.full(4, 622.08e6)}
+
+    of = searching(evaluate, confidence=0.5, minimise="-margin")
+    of.look_around()
+    seen = [c.cost for c in of.trace]
+    assert len(seen) == 10 and of.cost_scale == pytest.approx(float(np.ptp(np.quantile(seen, [0.25, 0.75]))))
+    assert of.scales.tolist() == pytest.approx([of.cost_scale, 622.08e6])  # which is the bound where no row differs
+
+
+def test_what_binds_an_optimum_are_limits_that_some_candidate_missed_and_ends_of_variables():
+    of = searching(variables=unit_cube(3), limits=(MARGIN, RATE, ANSWER))
+    of.scales = np.array([2.0, 1e7, 1.0])
+    best = Candidate({}, 1.0, (kept(0.03), kept(1e5, limit=RATE), kept(0.5, limit=ANSWER)))
+    other = Candidate({}, 1.0, (kept(-0.03), kept(1e5, limit=RATE), kept(-0.5, limit=ANSWER)))
+    of.known = {b"0": (np.array([0.5, 0.0, 1.0]), other), b"1": (np.array([0.0199, 0.9, 0.9801]), best)}
+    assert search._bound_by(of, best) == ("margin", "x0 at its low", "x2 at its high")
+
+
+def test_why_there_is_no_optimum_names_each_limit_that_is_missed_with_its_share():
+    refused = [Candidate({}, math.nan, (), words) for words in ("first", "last")]
+    asked = problem(confidence=0.975)
+    assert (
+        search._reason(asked, None, refused) == "no candidate is a mission: all 2 were refused, the last because last"
+    )
+    best = Candidate({}, 1.0, (kept(-1.0, 0.8125), kept(1.0, 1.0, ANSWER), kept(-2.0, 0.25, RATE)))
+    assert search._reason(asked, best, []) == (
+        "no candidate keeps margin >= 3 dB and data_rate <= 622.1 Mbit/s in 97.5 % of rows; the best has 81.25 % "
+        "and 25 %"
+    )
+    assert search._reason(asked, Candidate({}, 1.0, (kept(0.0),)), refused) == ""
+
+
+def test_an_optimum_is_confirmed_by_fresh_rows_that_reach_each_share_and_refused_ones_confirm_nothing():
+    asked = problem(confidence=0.9)
+    best = Candidate({"x0": 0.5}, 0.5, (kept(0.0),))
+
+    def confirmed(fresh):
+        return search.Optimum(asked, best, fresh, (), 9, 0, "", (), (best,)).confirmed
+
+    fresh = Candidate({}, 0.5, (kept(-1.0, 0.8, high=0.9), kept(1.0, 1.0)))
+    assert confirmed(fresh)
+    assert not confirmed(Candidate({}, 0.5, (kept(1.0, 1.0), kept(-1.0, 0.8, high=0.899))))
+    assert not confirmed(None) and not confirmed(Candidate({}, math.nan, (), "refused"))
+    assert confirmed(Candidate({}, 0.5, ()))
+
+
+@pytest.mark.parametrize(("evaluations", "size", "least"), [(23, 2, 24), (31, 3, 32), (1, 7, 64)])
+def test_too_few_evaluations_are_told_with_the_least_for_so_many_variables(evaluations, size, least):
+    asked = problem(variables=unit_cube(size), evaluations=evaluations)
+    with pytest.raises(CampaignError) as error:
+        search._check(asked)
+    words = f"{evaluations} are too few for {size} variables; give at least {least}"
+    assert str(error.value) == f"optimise.evaluations: {words}"
+    search._check(problem(variables=unit_cube(size), evaluations=least))
+
+
+def test_fresh_rows_that_cannot_be_drawn_are_warned_of():
+    best = Candidate({"x0": 0.25, "x1": 0.75}, 0.5, (kept(0.0),))
+    asked = []
+
+    def fresh(x):
+        asked.append(x.tolist())
+        raise CampaignError("no mission")
+
+    found = search._on_fresh_rows(problem(), best, fresh)
+    assert found == (None, ("the optimum could not be checked with fresh rows: no mission",))
+    assert asked == [[0.25, 0.75]]
+    assert search._on_fresh_rows(problem(), Candidate({}, 0.5, (kept(-1.0),)), never) == (None, ())
+    assert search._on_fresh_rows(problem(), None, never) == (None, ())

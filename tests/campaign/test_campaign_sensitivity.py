@@ -246,26 +246,26 @@ def three(found) -> list[float]:
 def test_indices_of_inputs_of_unlike_sizes_of_which_one_is_held_and_two_rows_lost() -> None:
     x = philox(31).random((120, 3))
     inputs = {"a": 2.0 + x[:, 0], "b": np.floor(4.0 * x[:, 1]), "c": 1e-6 * x[:, 2] ** 2, "held": np.full(120, 7.0)}
-    y = 3.0 * inputs["a"] ** 2 - inputs["b"] + 2e6 * inputs["a"] * inputs["c"]
+    y = 3.0 * inputs["a"] ** 2 - inputs["b"] + 2e6 * inputs["a"] * inputs["c"] + 0.75 * philox(32).normal(size=120)
     y[[5, 17]] = math.nan, math.inf
     found = sensitivity(inputs, y, "margin", 0.8)
     assert (found.output, found.rows, found.note) == ("margin", 118, "")
     first = {
-        "a": [0.8773943, 0.8517273, 0.9030613],
-        "b": [0.01657114, 0.0, 0.06152292],
-        "c": [0.2095269, 0.1048146, 0.3142392],
+        "a": [0.8464527, 0.8175376, 0.8753679],
+        "b": [0.01883476, 0.0, 0.06412448],
+        "c": [0.2025076, 0.09525451, 0.3097607],
         "held": [0.0, 0.0, 0.0],
     }
     total = {
-        "a": [0.8519299, 0.8347989, 0.8690609],
-        "b": [0.05146815, 0.04283435, 0.06010194],
-        "c": [0.09787038, 0.08346321, 0.1122775],
+        "a": [0.8263441, 0.8000378, 0.8838477],
+        "b": [0.05952912, 0.04426343, 0.1059921],
+        "c": [0.09253351, 0.0738738, 0.1423905],
         "held": [0.0, 0.0, 0.0],
     }
     ranks = {
-        "a": [0.939376, 0.9200341, 0.9541513],
-        "b": [-0.06624099, -0.1838596, 0.05324778],
-        "c": [0.334502, 0.2213604, 0.438758],
+        "a": [0.9216198, 0.897075, 0.9404949],
+        "b": [-0.08551934, -0.2026096, 0.03398177],
+        "c": [0.3389064, 0.2259975, 0.4428298],
         "held": [math.nan, math.nan, math.nan],
     }
     for wanted, told in ((first, found.first), (total, found.total), (ranks, found.rank_correlation)):
@@ -273,7 +273,7 @@ def test_indices_of_inputs_of_unlike_sizes_of_which_one_is_held_and_two_rows_los
         for key, numbers in wanted.items():
             assert three(told[key]) == pytest.approx(numbers, rel=1e-5, abs=1e-9, nan_ok=True)
             assert told[key].confidence == 0.8
-    assert found.surrogate_q2 == pytest.approx(1.0, rel=1e-6)
+    assert found.surrogate_q2 == pytest.approx(0.9688027, rel=1e-6)
 
 
 @pytest.mark.parametrize(
