@@ -21,13 +21,16 @@ from scipy import stats
 import microrad
 from campaign_files import MIRROR, UNCERTAINTY
 from microrad.campaign import bundle, records, run
+from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.engines import cluster
 from microrad.campaign.export import export_rows
 from microrad.campaign.file import load_campaign
-from microrad.campaign.ledger import Ledger, chunk_format, mending
+from microrad.campaign.ledger import Ledger, argument, chunk_format, mending
 from microrad.campaign.ledger.file import is_written
 from microrad.campaign.records import CampaignError, Outcome
 from microrad.campaign.rows import evaluate, evaluator
+from microrad.campaign.rows import evaluator as rows_evaluator
+from microrad.campaign.rows import plan as rows_plan
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import Plan, planned
@@ -1063,3 +1066,109 @@ def test_rows_have_a_curve_where_a_loop_runs_for_a_time(loop, tail, bins):
     found = made.rows(0, range(10, 15), lambda: None)
     assert found.survival.size == found.survival_square.size == bins and not found.survival.any()
     assert groups == ([2, 2, 1] if loop else [1, 1, 1, 1, 1])
+
+
+def plans(**changes):
+    """The plan of a campaign of these rows, of links alone."""
+    table = {"loop": None, "precision": None, "seed": 3}
+    given = {"outputs": [SimpleNamespace(group="link")], "rows": 300, "block": 32, "chunk_rows": None}
+    given |= {"realisations": 1, "loop_varies": False, "mission": None}
+    of_table = {name: changes.pop(name) for name in list(changes) if name in table}
+    return planned(SimpleNamespace(**given | changes, table=SimpleNamespace(**table | of_table)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "plan"),
+    [
+        ({}, Plan(256, 256, (300,), True)),
+        ({"rows": 5000, "chunk_rows": 16}, Plan(16, 1024, (5000,), True)),
+        ({"rows": 5, "outputs": [SimpleNamespace(group="day")]}, Plan(4, 4, (5,), False)),
+        ({"outputs": [SimpleNamespace(group="link"), SimpleNamespace(group="day")]}, Plan(8, 8, (300,), False)),
+        (
+            {"outputs": [SimpleNamespace(group="day")], "precision": SimpleNamespace(at_most=1000), "rows": 33},
+            Plan(8, 8, (64, 96, 160, 256, 384, 576, 864, 992), False),
+        ),
+        ({"precision": SimpleNamespace(at_most=1100), "rows": 300}, Plan(256, 256, (512, 768, 1024), True)),
+        ({"precision": SimpleNamespace(at_most=600), "rows": 300, "chunk_rows": 2}, Plan(2, 256, (512,), True)),
+    ],
+)
+def test_a_plan_has_the_chunks_and_rounds_of_its_rows(changes, plan):
+    assert plans(**changes) == plan
+
+
+@pytest.mark.parametrize(
+    ("own", "varies", "few", "rows"),
+    [
+        (1, False, 1024, 64),  # 2e7 steps over 1.25 s of 4 us each: 64 rows fill the lanes of a batch
+        (1, True, 1024, 1),
+        (16, False, 1024, 4),
+        (100, False, 1024, 1),
+        (100, True, 1024, 1),
+        (48, False, 1, 2),
+    ],
+)
+def test_rows_of_a_chunk_fill_the_lanes_and_take_a_second(monkeypatch, own, varies, few, rows):
+    fine = SimpleNamespace(plant_step_s=4e-6)
+    monkeypatch.setattr(rows_plan.loops, "settings", lambda file: fine)
+    monkeypatch.setattr(rows_plan.loops, "span", lambda table, f, seed: SimpleNamespace(duration_s=1.25 + 0.0 * seed))
+    found = plans(loop=object(), realisations=own, loop_varies=varies, rows=few)
+    assert (found.largest_chunk, found.is_timed) == (rows, False)
+
+
+def test_chunks_of_several_axes_joined_keep_the_sums_of_those_that_ran():
+    def part(number, rows, sums, failed=()):
+        columns = {"row": np.array(rows, dtype=float), "margin": -np.array(rows, dtype=float)}
+        lost = tuple(records.Failed(row, 7, 2, "lost") for row in failed)
+        return records.Chunk(3, number, columns, lost, np.array(sums, dtype=float), 10.0 * np.array(sums, dtype=float))
+
+    whole = records.joined([part(5, [8, 9], [], [9]), part(6, [10], [1, 2]), part(7, [11, 12], [0.5, 4], [12, 11])])
+    assert (whole.cell, whole.number, [each.row for each in whole.failed]) == (3, 5, [9, 12, 11])
+    assert (whole.columns["row"].tolist(), whole.columns["margin"].tolist()) == (
+        [8, 9, 10, 11, 12],
+        [-8, -9, -10, -11, -12],
+    )
+    assert (whole.survival.tolist(), whole.survival_square.tolist()) == ([1.5, 6.0], [15.0, 60.0])
+    none = records.joined([part(5, [8], []), part(6, [9], [])])
+    assert none.survival.size == none.survival_square.size == 0
+
+
+def test_a_weighted_row_and_a_simulated_one_are_those_of_their_number():
+    weighted = rows_evaluator._Weighted(128, np.array([1e-6, 2e-6, 3e-6]), np.array([-0.5, 0.25, 1.5]))
+    assert weighted.row(129) == {"tail_radius": 2e-6, "tail_log_weight": 0.25}
+    assert weighted.row(130) == {"tail_radius": 3e-6, "tail_log_weight": 1.5}
+    runs = SimpleNamespace(part=lambda first, count: (first, count))
+    assert rows_evaluator.Simulated(128, 5, runs).row(131) == (15, 5)
+
+
+def test_the_head_of_a_ledger_has_a_column_for_each_number_of_a_row(monkeypatch):
+    monkeypatch.setattr(run.bundle, "hashes", lambda campaign: {"campaign": campaign.sha256})
+    campaign = SimpleNamespace(
+        path=Path("folder") / "name.of.it.toml",
+        text="the text",
+        sha256="aa",
+        mission=SimpleNamespace(mission=SimpleNamespace(name="a mission")),
+        table=SimpleNamespace(seed=2**64 - 1),
+        inputs=(records.InputText("a.b", "W", "normal"), records.InputText("c", "", "uniform")),
+        outputs=(OUTPUTS["data_rate"], OUTPUTS["outage"]),
+        cells=[SimpleNamespace(values={"x": "1"}), SimpleNamespace(values={"x": "2"})],
+    )
+    head = run._head(campaign, b"bundle")
+    assert [tuple(column) for column in head.columns] == [
+        ("row", "", "number of the row in its cell"),
+        ("weight", "", "weight of the row"),
+        ("a.b", "W", "drawn"),
+        ("c", "", "drawn"),
+        ("data_rate", "bit/s", "data rate that keeps requirement.margin but for the outage"),
+        ("outage", "", "share of the time with less than 0 dB"),
+    ]
+    assert (head.campaign_name, head.campaign_text, head.mission_name) == ("name.of.it", "the text", "a mission")
+    assert (head.seed, head.hashes, head.bundle) == (2**64 - 1, {"campaign": "aa"}, b"bundle")
+    assert head.cells == ({"x": "1"}, {"x": "2"})
+    assert list(head.versions) == ["microrad", "numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield"]
+
+
+def test_what_is_told_of_a_campaign_that_stops_is_how_to_go_on(monkeypatch):
+    made = a_runner()
+    made.book, made.pace.done = SimpleNamespace(path=Path("a folder") / "b.ledger"), 12
+    path = Path("a folder") / "b.ledger"
+    assert made._stopped() == f"12 rows are in {path}. Go on with: microrad campaign resume {argument(path)}"

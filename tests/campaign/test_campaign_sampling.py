@@ -289,3 +289,63 @@ def test_an_uncertainty_that_leaves_no_mirror_says_so(tmp_path):
     bad = iter([np.array([-1e3, 0.0, 0.0])] * mirror_spread.TRIES)
     with pytest.raises(ValueError, match=r"leaves no mirror: none of 10000 draws is one.*10000 times because"):
         mirror_spread.parameters(c.mission.mission.mirror, np.array([[-1e3, 0.0, 0.0]]), lambda row: bad)
+
+
+@pytest.mark.parametrize(
+    ("method", "first", "points"),
+    [
+        (
+            "random",
+            6,
+            [
+                [0.4726447, 0.2040295, 0.1536683, 0.2062889, 0.2905996],
+                [0.08024089, 0.623855, 0.4871266, 0.5605246, 0.348085],
+            ],
+        ),
+        ("latin-hypercube", 15, [[0.07754339, 0.4376638, 0.06679801], [0.6728366, 0.910744, 0.08288494]]),
+        ("sobol", 15, [[0.4349522, 0.1619034, 0.175695], [0.9619341, 0.01317738, 0.633286]]),
+    ],
+)
+def test_points_across_the_end_of_a_block_are_those_of_their_seed_and_number(method, first, points):
+    size = len(points[0])
+    np.testing.assert_allclose(sampling.uniform(method, 9, 16, size, first, 2), points, rtol=1e-6)
+    whole = sampling.uniform(method, 9, 16, size, 0, 20)
+    np.testing.assert_allclose(whole[first : first + 2], points, rtol=1e-6)
+    assert sampling.uniform(method, 9, 16, 0, first, 2).shape == (2, 0)
+    assert sampling.uniform(method, 9, 16, 4, first, 0).shape == (0, 4)
+
+
+@pytest.mark.parametrize(
+    ("of", "share", "value", "density"),
+    [
+        (Normal(-2.5, 0.5), 0.1, -2.5 - 0.5 * 1.2815515655446004, -0.5 * 1.2815515655446004**2 - 0.2257913526447274),
+        (Uniform(-2.5, 1.5), 0.1, -2.1, -math.log(4.0)),
+        (LogUniform(2.0, 50.0), 0.1, 2.0 * 25.0**0.1, -math.log(2.0 * 25.0**0.1 * math.log(25.0))),
+        (OneOf((7.0, -3.0, 2.0), (0.0625, 0.5, 0.4375), ("x",) * 3, False), 0.1, -3.0, math.log(0.5)),
+        (OneOf((7.0, -3.0, 2.0), (0.0625, 0.5, 0.4375), ("x",) * 3, False), 0.5625, 2.0, math.log(0.4375)),
+    ],
+)
+def test_a_share_of_the_draws_stays_below_its_value_which_has_its_density(of, share, value, density):
+    found = of.at(np.array([share, 0.5]))
+    assert float(found[0]) == pytest.approx(value, rel=1e-9)
+    assert float(of.log_density(found)[0]) == pytest.approx(density, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("of", "unit", "words"),
+    [
+        (Normal(622.08e6, 2.5e6), "bit/s", "normal, mean 622.1 Mbit/s, deviation 2.5 Mbit/s"),
+        (Normal(0.123456789, 0.0625), "", "normal, mean 0.123457, deviation 0.0625"),
+        (Uniform(-2.5e-6, 1.5e-5), "rad", "uniform, -2.5 µrad to 15 µrad"),
+        (LogUniform(0.05, 1.25), "m", "log-uniform, 50 mm to 1.25 m"),
+        (OneOf((0.05, 1.25), (0.25, 0.75), ("5 cm", "1.25 m"), False), "m", "one of 50 mm, 1.25 m, weights 0.25, 0.75"),
+        (
+            OneOf((1.0, 2.0, 3.0), (0.5, 0.125, 0.375), ("a", "b", "c"), True),
+            "",
+            "one of 1 = a, 2 = b, 3 = c, weights 0.5, 0.125, 0.375",
+        ),
+        (OneOf((4.0, 8.0), (0.5, 0.5), (4, 8), False), "", "one of 4, 8"),
+    ],
+)
+def test_a_distribution_in_words_has_its_numbers_in_their_unit(of, unit, words):
+    assert of.words(unit) == words
