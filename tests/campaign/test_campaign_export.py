@@ -369,3 +369,47 @@ def test_memory_does_not_grow_with_the_number_of_rows(tmp_path, kind, two_sizes)
     less, more = map(int, subprocess.run(code, capture_output=True, check=True).stdout.split())
     assert Path(target).stat().st_size > 4_000_000
     assert more - less < 150_000 * 3 * 8 / 1024 / 2  # half of what the further rows' numbers take
+
+
+def test_a_csv_file_has_every_digit_every_unit_and_every_text_of_its_rows(tmp_path):
+    cells = ({"mirror": "-a.toml", "set, of": "x"}, {"mirror": 'b "c"', "set, of": "1\n2"})
+    with Ledger.create(tmp_path / "a.ledger", head(cells)) as book:
+        for cell, number, rows, lost in ((1, 0, (0, 1), "=x \0 µ"), (0, 1, (2, 3), ""), (0, 0, (0, 1), "died")):
+            columns = {
+                "row": np.array(rows, dtype=float),
+                "weight": np.array([0.5, 2.0]),
+                "link/power": np.array([1e-300, 622.08e6 + 1e-7]),
+                "margin": np.array([np.nan, -0.0]),
+            }
+            failed = (Failed(rows[0], 9, 2, lost),)
+            done = Chunk(cell, number, columns, failed, np.zeros(0), np.zeros(0))
+            book.put(cell, number, chunk_format.pack_chunk(done))
+        assert export.export_rows(book, tmp_path / "A.CSV") == 6
+    assert (tmp_path / "A.CSV").read_text(encoding="utf-8").split("\n") == [
+        'cell,mirror,"set, of",row,weight,link/power [W],margin [dB],failed',
+        "0,'-a.toml,x,0,0.5,1e-300,nan,died",
+        "0,'-a.toml,x,1,2.0,622080000.0000001,-0.0,",
+        "0,'-a.toml,x,2,0.5,1e-300,nan,without a reason",
+        "0,'-a.toml,x,3,2.0,622080000.0000001,-0.0,",
+        '1,"b ""c""","1',
+        "2\",0,0.5,1e-300,nan,'=x \\0 µ",
+        '1,"b ""c""","1',
+        '2",1,2.0,622080000.0000001,-0.0,',
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("a.txt", "microrad exports to .nc, .parquet, .csv, not to '.txt'"),
+        ("a", "microrad exports to .nc, .parquet, .csv, not to 'no suffix'"),
+        ("no/a.csv", "there is no folder {folder}: make it, or choose another"),
+    ],
+)
+def test_where_no_table_can_be_written_is_told_in_full(tmp_path, name, words):
+    path = tmp_path / name
+    with Ledger.create(tmp_path / "a.ledger", head()) as book:
+        assert said(export.export_rows, book, path) == f"{path}: {words.format(folder=path.parent)}"
+        none = said(export.export_rows, book, tmp_path / "a.csv")
+    assert none == f"{tmp_path / 'a.ledger'} has no rows yet: run or resume the campaign first"

@@ -821,3 +821,59 @@ def test_a_chunk_is_written_through_to_the_disk_with_its_sha256(path):
     assert payload == packed(0)
     assert checksum == file.digest(0, 0, payload) and len(checksum) == 32
     assert checksum != file.digest(0, 1, payload)
+
+
+def test_what_a_ledger_refuses_is_told_in_full(path):
+    renamed = replace(chunk(3, 1), columns={"row": np.zeros(2), "margins": np.zeros(2)})
+    with Ledger.create(path, HEAD) as book:
+        assert said(book.put, 1, 4, packed(3, 0)) == "chunk 3 of cell 0 came for chunk 4 of cell 1"
+        assert said(book.put, 1, 3, chunk_format.pack_chunk(renamed)) == (
+            "chunk 3 of cell 1 has the columns row, margins, and the ledger is of row, weight, margin: its worker runs "
+            "another microrad"
+        )
+        book.put(1, 3, packed(3, 1))
+        assert said(book.put, 1, 3, chunk_format.pack_chunk(replace(chunk(3, 1), failed=()))) == (
+            f"{path}: chunk 3 of cell 1 came out otherwise than when it was first done: the workers do not compute the "
+            "same; check that all run the same microrad and libraries"
+        )
+        assert said(book._sound, 1, 3, b"", packed(3, 1)) == (
+            f"{path}: chunk 3 of cell 1 is damaged, its checksum differs; `microrad campaign resume "
+            f"{file.argument(path)}` does it again"
+        )
+        assert (book.count(), book.done(), book.get(1, 4), book.get(0, 3)) == (1, {(1, 3)}, None, None)
+    with Ledger.open(path, write=False) as book:
+        doing = {
+            f"{path} is open for reading, so microrad cannot keep chunk 4 of cell 1": (book.put, 1, 4, packed(4, 1)),
+            f"{path} is open for reading, so microrad cannot note 'state'": (book.note, "state", 1),
+            f"{path} is open for reading, so microrad cannot keep the trace of row 17 of cell 0": (
+                book.put_trace,
+                TRACE,
+            ),
+            f"{path} is open for reading, so microrad cannot drop the trace of row 17 of cell 0": (
+                book.drop_trace,
+                TRACE,
+            ),
+        }
+        assert [said(*call) for call in doing.values()] == list(doing)
+
+
+def test_hashes_that_differ_or_are_missing_on_a_side_are_told_each_in_its_line():
+    message = said(check_same, {"b": "1", "a": "2", "d": "5"}, {"a": "3", "c": "4", "d": "5"}, "x.ledger")
+    assert message == (
+        "x.ledger was begun with another a and b and c, so its rows would not belong together:\n"
+        "  a: 2 in the ledger, 3 now\n"
+        "  b: 1 in the ledger, None now\n"
+        "  c: None in the ledger, 4 now\n"
+        "bring back what it was begun with, or begin the campaign anew in another file"
+    )
+
+
+def test_what_was_added_comes_in_the_order_in_which_it_came_behind_its_mark(path):
+    with Ledger.create(path, HEAD) as book:
+        for number, cell in ((2, 1), (0, 0), (1, 1)):
+            book.put(cell, number, packed(number, cell))
+        found = list(book.added(0))
+        assert [(each.cell, each.number) for _, each in found] == [(1, 2), (0, 0), (1, 1)]
+        assert [(each.cell, each.number) for _, each in book.added(found[0][0])] == [(0, 0), (1, 1)]
+        assert [each.number for each in book.chunks(1)] == [1, 2]
+        assert list(book.added(found[-1][0])) == []

@@ -1,7 +1,9 @@
 """Campaigns of links alone: on every file that `microrad budget` takes, with every quantity drawn from anything."""
 
 import json
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,24 +12,29 @@ from day_files import ALONE, day_file, day_path
 from link_files import FADING
 from microrad import link
 from microrad.campaign import bundle, run
-from microrad.campaign.definition.keys import find, flat
+from microrad.campaign.definition.distributions import OneOf, Uniform
+from microrad.campaign.definition.keys import find, flat, put
+from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.campaign.definition.records import Cell, Draw
 from microrad.campaign.export import export_rows
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
+from microrad.campaign.rows import evaluate
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
 from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.summary import summarise_campaign
-from microrad.core import reads
+from microrad.core import kernels, lti, reads
 from microrad.link import radial_error
 from microrad.link import study as link_study
 from microrad.link.beams import LitAperture
 from microrad.link.pointing import outage as under_jitter
 from microrad.link.pointing.outage import Exposure
 from microrad.link.variation import LINK_TABLES
+from microrad.loop.control import AxisController
 from microrad.mission.fields import Several
-from microrad.mission.file import load_link, named_files, open_mission
+from microrad.mission.file import either_file, load_link, load_mission, named_files, open_mission, with_values
 from microrad.mission.toml import MissionError
 from microrad.orbit import day as day_study
 from optical_files import optical
@@ -468,3 +475,194 @@ def test_rows_of_the_day_stand_in_small_chunks(tmp_path):
         plan = planned(replace(campaign, keep=keep))
         assert (plan.chunk_rows, plan.largest_chunk, plan.is_timed) == (rows, rows, timed)
     assert planned(replace(campaign, keep=("volume",), rows=4)).largest_chunk == 4
+
+
+# ----------------------------------------------------------------------------------------- outputs of a row, one by one
+class Told(dict):
+    """Runs of a loop whose every number is another."""
+
+    radial_rms_rad = 1.5e-6
+    largest_rad = np.array([2.5e-6, 7.5e-6, 3.5e-6])
+
+    def quantile_rad(self, probability):
+        return 1e-6 * probability
+
+    def beyond(self, radius_rad):
+        return 1e3 * radius_rad
+
+    def share(self, counter):
+        return 10.0 + counter
+
+
+def test_each_output_of_the_residual_is_its_own_number_of_the_runs():
+    file = load_mission(SHIPPED)
+    m, counters = file.mission, kernels
+    wanted = {
+        "residual_rms": 1.5e-6,
+        "residual_quantile": 1e-6 * m.fine_pointing.quantile,
+        "residual_largest": 7.5e-6,
+        "beyond_share": 1e3 * m.requirement.pointing_error_rad,
+        "lost_share": 10.0 + counters.COUNT_LOST,
+        "saturated_share": 10.0 + counters.COUNT_SATURATED,
+        "beyond_rate_share": 10.0 + counters.COUNT_CLAMPED,
+        "outside_share": 10.0 + counters.COUNT_OUTSIDE,
+    }
+    assert len(set(wanted.values())) == len(wanted)
+    assert evaluate.outputs(file, Told(), list(wanted)[::-1]) == pytest.approx(wanted)
+    assert list(evaluate.outputs(file, Told(), list(wanted)[::-1])) == list(wanted)
+    assert evaluate.outputs(file, Told(), ["outside_share"]) == {"outside_share": 10.0 + counters.COUNT_OUTSIDE}
+
+
+def test_each_output_of_the_links_and_the_day_is_its_own_number(monkeypatch):
+    file = load_mission(SHIPPED)
+    under = SimpleNamespace(margin_db=1.25, short_of=lambda margin_db: 0.5 + margin_db / 100.0, outage_loss_db=2.25)
+    monkeypatch.setattr(evaluate, "_exposure", lambda data, runs: under)
+    monkeypatch.setattr(evaluate, "_margin_under_fades", lambda file, data: 3.25)
+    monkeypatch.setattr(evaluate, "_rate", lambda data, loss_db: 1e6 * loss_db)
+    monkeypatch.setattr(
+        evaluate, "_beam_margin", lambda of: {"beacon": 4.25, "answer": 5.25}[of.name] + of.beam.wavelength_m
+    )
+    monkeypatch.setattr(evaluate, "_day", lambda file, of: SimpleNamespace(capacity_bit=6.25e9, contact_s=725.0))
+    monkeypatch.setattr(evaluate, "_optical_bit", lambda file: 8.25e9)
+    m = file.mission
+    names = [name for name, output in OUTPUTS.items() if output.group != "residual"]
+    assert evaluate.outputs(file, None, names) == {
+        "margin": 1.25,
+        "margin_under_fades": 3.25,
+        "outage": 0.5,
+        "short": 0.5 + m.requirement.margin_db / 100.0,
+        "data_rate": 2.25e6,
+        "beacon_margin": 4.25 + m.beacon.wavelength_m,
+        "answer_margin": 5.25 + m.answer.wavelength_m,
+        "volume": 6.25e9,
+        "contact_time": 725.0,
+        "optical_volume": 8.25e9,
+    }
+
+
+def test_a_share_of_the_time_beyond_a_bin_is_of_all_runs_together():
+    runs = SimpleNamespace(histogram=np.array([[5, 1, 0, 2], [3, 0, 4, 1]]))
+    np.testing.assert_allclose(evaluate.exceeded(runs), [1.0, 0.5, 7.0 / 16.0, 3.0 / 16.0], rtol=1e-15)
+
+
+def test_a_rate_that_no_link_closes_is_none_and_more_light_than_was_sent_is_refused(monkeypatch):
+    def refused(data, margin_db, loss_db):
+        raise link.LinkError("no rate")
+
+    data = SimpleNamespace(requirement=SimpleNamespace(margin_db=3.5))
+    monkeypatch.setattr(link, "rate_at_loss", lambda data, margin_db, loss_db: 100.0 * margin_db + loss_db)
+    assert evaluate._rate(data, 2.25) == 352.25
+    monkeypatch.setattr(link, "rate_at_loss", refused)
+    assert evaluate._rate(data, 2.25) == 0.0
+    words = "its budget has more light arrive than was sent: the terminals are too near for it"
+    monkeypatch.setattr(Exposure, "stated", lambda data: SimpleNamespace(possible=False))
+    with pytest.raises(link.LinkError, match=f"^{words}$"):
+        evaluate._exposure(data, None)
+    monkeypatch.setattr(link, "beam_budget", lambda *given: SimpleNamespace(possible=False))
+    beam = evaluate._Beam("answer", (object(),), None, None, {})
+    with pytest.raises(link.LinkError, match=f"^answer: {words}$"):
+        evaluate._beam_margin(beam)
+
+
+# ------------------------------------------------------------------------------------------------ missions of rows
+@pytest.fixture(scope="module")
+def builder():
+    """Of two cells of the shipped mission, whose second has another aperture; power, words and a list are drawn."""
+    document = open_mission(SHIPPED)
+    cells = []
+    for aperture in ("5 cm", "62.5 mm"):
+        data = put(document.data, "terminals.leo_aperture", aperture)
+        cells.append(Cell({"terminals.leo_aperture": aperture}, data, either_file(with_values(document, data))))
+    strehl = OneOf((1.0, 2.0), (0.5, 0.5), ("decibel", "ratio"), True)
+    draws = (
+        Draw("communication.transmit_power", "W", Uniform(1.0, 9.0), None),
+        Draw("conventions.strehl", "", strehl, None),
+    )
+    return MissionBuilder(SimpleNamespace(cells=tuple(cells), draws=draws))
+
+
+def test_a_row_of_the_second_cell_has_its_grid_and_its_draws_with_their_sources(builder):
+    drawn = {"communication.transmit_power": 2.0625, "conventions.strehl": 1.0, "mirror.none": math.nan}
+    file = builder.mission(1, drawn)
+    m = file.mission
+    assert (m.terminals.leo_aperture_m, m.communication.transmit_power_w, m.conventions.strehl) == (
+        0.0625,
+        2.0625,
+        "decibel",
+    )
+    assert builder.mission(0, drawn).mission.terminals.leo_aperture_m == 0.05
+    power, strehl = (file.sources[key] for key in ("communication.transmit_power", "conventions.strehl"))
+    assert (power.line, power.comment, power.value, power.file) == (
+        0,
+        "campaign: drawn, 2.0625 W",
+        "2.0625 W",
+        "campaign file",
+    )
+    assert (strehl.comment, strehl.value) == ("campaign: drawn, decibel", "decibel")
+    assert builder.mission(1, {}) is builder._cells[1].file
+    frequencies = builder.mission(0, {"scenario.pid_frequencies": 22.5}).mission.scenario.pid_frequencies_hz
+    assert frequencies == pytest.approx((1.5, 22.5))  # in proportion to the largest of 1 and 15 Hz
+    assert builder.mission(0, {"scenario.pid_frequencies.1": 0.5}).mission.scenario.pid_frequencies_hz == (0.5, 15.0)
+
+
+def test_a_row_that_is_no_mission_says_each_key_with_its_drawn_value(builder):
+    with pytest.raises(CampaignError) as refused:
+        builder.mission(1, {"communication.transmit_power": -2.0625, "terminals.geo_aperture": 2e3})
+    assert str(refused.value) == (
+        'the row is no mission: terminals.geo_aperture = "2000.0 m" is above 100 m; communication.transmit_power = '
+        '"-2.0625 W" is not above 0 W'
+    )
+
+
+def test_the_loop_of_a_row_is_told_by_what_it_depends_on_alone(builder):
+    values = {"communication.transmit_power": 2.0, "fine_pointing.optical_sensor.noise": 1e-6, "mirror.travel": 0.25}
+    key = (("fine_pointing.optical_sensor.noise", 1e-6), ("mirror.travel", 0.25))
+    assert builder.loop_key(0, values) == builder.loop_key(1, values) == key
+
+
+# ------------------------------------------------------------------------------------------------------- in one piece
+def test_a_file_of_a_bundle_lies_within_its_folder_and_no_other_does(tmp_path):
+    assert bundle._inside(tmp_path, "a/../b/c.toml") == tmp_path / "b" / "c.toml"
+    for name in ("../c.toml", "a/../..", ".", "", "/c.toml", "a\0b"):
+        with pytest.raises(CampaignError) as refused:
+            bundle._inside(tmp_path, name)
+        assert (
+            str(refused.value) == f"the ledger holds a file {name!r}, which microrad never puts there: leave it alone"
+        )
+
+
+def test_files_are_named_from_the_nearest_folder_that_holds_them_all(tmp_path):
+    files = [tmp_path / "a" / "c.toml", tmp_path / "a" / ".." / "b" / "m.toml", tmp_path / "a" / "d" / "x.toml"]
+    assert bundle._named(files) == dict(zip(("a/c.toml", "b/m.toml", "a/d/x.toml"), files, strict=True))
+    assert bundle._named(files[:1]) == {"c.toml": files[0]}
+
+
+def test_a_controller_of_unlike_matrices_comes_back_from_a_bundle():
+    A, B, C, D = np.array([[1.5, 2.0], [3.0, 4.0]]), np.array([[5.0], [6.0]]), np.array([[7.0, 8.0]]), np.array([[0.1]])
+    given = AxisController("PI", lti.StateSpace(A, B, C, D), np.array([[9.0], [1e-17]]))
+    found = bundle._read_controller(json.loads(json.dumps(bundle._written_controller(given))))
+    assert found.name == "PI"
+    for ours, theirs in zip(
+        (A, B, C, D, given.anti_windup), (*(getattr(found.system, n) for n in "ABCD"), found.anti_windup), strict=True
+    ):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_the_files_of_a_campaign_tell_it_apart_by_their_names_and_bytes_but_for_its_own(tmp_path):
+    for name in ("c.toml", "m.toml", "x.toml"):
+        (tmp_path / name).write_text(name)
+    campaign = SimpleNamespace(path=tmp_path / "c.toml", files=tuple(tmp_path / f"{name}.toml" for name in "cmx"))
+
+    def now():
+        return bundle.mission_sha256(campaign)
+
+    first = now()
+    (tmp_path / "c.toml").write_text("other")
+    assert now() == first
+    (tmp_path / "x.toml").write_text("other")
+    assert now() != first
+    (tmp_path / "x.toml").write_text("x.toml")
+    assert now() == first
+    (tmp_path / "y.toml").write_text("x.toml")
+    campaign.files = (*campaign.files[:2], tmp_path / "y.toml")
+    assert now() != first
