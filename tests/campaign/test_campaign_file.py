@@ -16,7 +16,9 @@ from scipy.stats import norm
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
 from microrad import link
 from microrad.campaign import bundle
+from microrad.campaign import file as campaign_file
 from microrad.campaign.definition import cells, draws, keys
+from microrad.campaign.definition.reader import block_rows
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import file
@@ -24,6 +26,7 @@ from microrad.campaign.records import CampaignError
 from microrad.campaign.rows import evaluate, loops, sampling
 from microrad.campaign.rows.evaluator import Evaluator
 from microrad.campaign.rows.missions import MissionBuilder
+from microrad.core import reads
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
 from scenes import scene_of
@@ -1275,3 +1278,145 @@ def test_weights_of_inputs_that_are_drawn_from_other_distributions_multiply(tmp_
     ]
     assert weights == pytest.approx(ratios[0] * ratios[1], rel=1e-9)
     assert np.abs(np.log(ratios[0])).max() > 0.5
+
+
+# --------------------------------------------------------------------------------------------------- in whole sentences
+def test_what_is_drawn_in_vain_is_told_with_all_that_is_kept(tmp_path):
+    text = HEAD + 'keep = ["beacon_margin", "answer_margin"]\n' + POWER
+    (fault,) = faults(tmp_path, text)
+    assert (fault.key, fault.reason, fault.expected) == (
+        "inputs.communication.transmit_power",
+        "is read by nothing that is kept (beacon_margin, answer_margin): it would change no number",
+        "a key that they depend on, or another output in `keep`",
+    )
+
+
+@pytest.mark.parametrize(
+    ("key", "path"),
+    [
+        ("communication.transmit_power", ("communication", "transmit_power_w")),
+        ("pointing.lines.misalignment.error", ("pointing", "lines", (reads.KEY, "misalignment"), "error_rad")),
+        ("scenario.pid_frequencies.2", ("scenario", "pid_frequencies_hz")),
+        ("pointing.lines.body_pointing.class", ("pointing", "lines", (reads.KEY, "body_pointing"), "kind")),
+        ("name", ("name",)),
+    ],
+)
+def test_a_key_is_read_at_its_field_or_in_the_list_that_holds_it(key, path):
+    assert campaign_file._path(load_mission(SHIPPED).mission, key) == (0, "mission", *path)
+
+
+@pytest.mark.parametrize(
+    ("known", "digests", "read"),
+    [
+        (True, (), False),
+        (False, (), True),
+        (True, (("a", "b"),), True),
+        (True, (("a", reads.WHOLE),), True),
+        (True, ((reads.WHOLE,),), True),
+        (True, (("a", "b", reads.WHOLE),), False),
+        (True, (("a",), ("b",)), False),
+    ],
+)
+def test_a_value_is_read_by_itself_or_with_a_record_that_holds_it(known, digests, read):
+    seen = SimpleNamespace(known=known, digests=dict.fromkeys(digests))
+    assert campaign_file._is_read(seen, ("a", "b")) is read
+
+
+def test_a_fault_of_one_cell_has_its_values_and_one_of_all_has_none(tmp_path):
+    grid = '[grid]\n"mirror.bias" = ["6 V", "13 V"]\n"requirement.margin" = ["1 dB", "2 dB"]\n'
+    (fault,) = faults(tmp_path, HEAD + POWER + grid)
+    assert (fault.key, fault.value) == ("grid.mirror.bias", '"13 V"')
+    assert fault.reason == (
+        "is outside drive_min to drive_max (0 V to 12 V) (in the cell mirror.bias = 13 V, requirement.margin = 1 dB)"
+    )
+    assert fault.expected == "0 V to 12 V"
+    (fault,) = faults(
+        tmp_path, HEAD + POWER + '[set]\n"mirror.bias" = "13 V"\n[grid]\n"requirement.margin" = ["1 dB"]\n'
+    )
+    assert (fault.key, fault.value) == ("set.mirror.bias", '"13 V"')
+    assert fault.reason == "is outside drive_min to drive_max (0 V to 12 V)"
+
+
+def test_cells_of_two_axes_run_the_last_fastest_with_sources_of_the_file(tmp_path):
+    grid = '[set]\n"communication.distance" = "40000 km" # of ours\n'
+    grid += '[grid]\n"terminals.leo_aperture" = ["5 cm", "62.5 mm"]\n'
+    grid += '"communication.data_rate" = ["622.08 Mbit/s", "1 Gbit/s"] # both\n'
+    found = loaded(tmp_path, HEAD + POWER + grid)
+    assert [cell.label for cell in found.cells] == [
+        f"terminals.leo_aperture = {aperture}, communication.data_rate = {rate}"
+        for aperture in ("5 cm", "62.5 mm")
+        for rate in ("622.08 Mbit/s", "1 Gbit/s")
+    ]
+    rates = [cell.file.mission.communication.data_rate_bit_s for cell in found.cells]
+    assert rates == [622.08e6, 1e9, 622.08e6, 1e9]
+    assert [cell.file.mission.terminals.leo_aperture_m for cell in found.cells] == [0.05, 0.05, 0.0625, 0.0625]
+    sources = found.cells[2].file.sources
+    told = [sources[key] for key in ("communication.distance", "terminals.leo_aperture", "communication.data_rate")]
+    assert [(each.comment, each.value, each.file) for each in told] == [
+        ("campaign: of ours", "40000 km", "campaign file"),
+        ("campaign: [grid]", "62.5 mm", "campaign file"),
+        ("campaign: both", "622.08 Mbit/s", "campaign file"),
+    ]
+    assert [each.line for each in told] == [
+        line_of(tmp_path, name) for name in ("distance", "leo_aperture", "data_rate")
+    ]
+    assert found.fixed == {"communication.distance": "40000 km"}
+    assert found.mission.mission.communication.data_rate_bit_s == 300e6
+
+
+@pytest.mark.parametrize(
+    ("grid", "key", "reason", "expected"),
+    [
+        (
+            '"terminals.leo_aperture" = []',
+            "terminals.leo_aperture",
+            "is not a list with something in it",
+            "the values of the grid: [first, second]",
+        ),
+        (
+            '"terminals.leo_aperture" = ["5 cm", "6 cm", "5 cm"]',
+            "terminals.leo_aperture",
+            "stands twice",
+            "each value once",
+        ),
+        (
+            'mirror = ["mirror.toml", 3]',
+            "mirror",
+            "is no path",
+            'a mirror file, seen from the campaign file: "mirror.toml"',
+        ),
+    ],
+)
+def test_a_grid_that_is_none_says_what_would_be_one(tmp_path, grid, key, reason, expected):
+    (fault,) = faults(tmp_path, HEAD + POWER + f"[grid]\n{grid}\n")
+    assert (fault.key, fault.reason, fault.expected) == (f"grid.{key}", reason, expected)
+
+
+def test_an_identified_mirror_beside_its_own_parameter_or_without_uncertainty_is_told_in_full(tmp_path):
+    both = '[set]\nmirror = "mirror.toml"\n'
+    both += distributed("mirror.bouc_wen.alpha", 'distribution = "uniform"\nlow = "2 1/V"\nhigh = "3 1/V"')
+    (fault,) = faults(tmp_path, HEAD + LOOP + IDENTIFIED + both)
+    assert (fault.key, fault.reason, fault.expected) == (
+        "inputs.mirror",
+        "draws mirror.bouc_wen.alpha, which the campaign gives too",
+        "one of the two removed",
+    )
+    (fault,) = faults(tmp_path, HEAD + LOOP + IDENTIFIED + '[grid]\nmirror = ["mirror.toml", "plain.toml"]\n')
+    assert fault.reason == 'is to be identified, but the mirror "plain mirror of a test" has no table uncertainty'
+    found = loaded(tmp_path, HEAD + LOOP + IDENTIFIED + '[grid]\nmirror = ["mirror.toml"]\n')
+    assert [(each.key, each.unit, each.distribution) for each in found.inputs] == [
+        ("mirror.bouc_wen.d1", "rad/V", "identified, standard error 2 %"),
+        ("mirror.bouc_wen.alpha", "1/V", "identified, standard error 3 %"),
+        ("mirror.linear.poles.1", "Hz", "identified, standard error 1 %"),
+    ]
+
+
+def test_what_is_rounded_up_is_told_with_both_numbers(tmp_path):
+    noise = HEAD.replace("runs = 256", "runs = 300\nrealisations = 65") + LOOP + NOISE
+    assert loaded(tmp_path, noise).warnings == (
+        "runs = 300 is rounded up to 320 rows, whole sets of sobol sampling",
+        "realisations = 65 takes as long as 128: runs are advanced 64 side by side",
+    )
+    assert [block_rows(runs) for runs in (1, 127, 128, 255, 256, 300, 32767, 32768, 10**6)] == [
+        *(16, 16, 16, 16, 32, 32, 2048, 4096, 4096)
+    ]

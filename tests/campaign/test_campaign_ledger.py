@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import textwrap
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -877,3 +878,107 @@ def test_what_was_added_comes_in_the_order_in_which_it_came_behind_its_mark(path
         assert [(each.cell, each.number) for _, each in book.added(found[0][0])] == [(0, 0), (1, 1)]
         assert [each.number for each in book.chunks(1)] == [1, 2]
         assert list(book.added(found[-1][0])) == []
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (sqlite3.SQLITE_FULL, "the disk is full. {safe}Free space, then {again}"),
+        (
+            sqlite3.SQLITE_IOERR,
+            "the disk does not take or give the data (odd). {safe}Check the disk and its space, then {again}",
+        ),
+        (sqlite3.SQLITE_READONLY, "odd. {safe}Make file and folder writable, then {again}"),
+        (sqlite3.SQLITE_CANTOPEN, "odd. {safe}Make file and folder readable and writable, then {again}"),
+        (sqlite3.SQLITE_PERM, "odd. {safe}Make file and folder readable and writable, then {again}"),
+        (
+            sqlite3.SQLITE_BUSY,
+            "another program held the file for longer than 30 s. {safe}Close that program, then {again}",
+        ),
+        (sqlite3.SQLITE_ERROR, "odd. {safe}See to that, then {again}"),
+        (
+            sqlite3.SQLITE_CORRUPT,
+            "the file is damaged (odd). `microrad campaign resume {path}` goes on with what can be read of it; where "
+            "nothing can, begin the campaign anew in another file",
+        ),
+    ],
+)
+def test_an_error_of_sqlite_says_what_is_in_and_what_to_do(path, code, words):
+    filled(path, 3)
+    error = sqlite3.OperationalError("odd")
+    error.sqlite_errorcode = code | 5 << 8  # an extended code says more, and means the same
+    typed = file.argument(path)
+    safe = "4 chunks are in and stay; only what was being written is lost. "
+    wanted = words.format(safe=safe, again=f"go on with `microrad campaign resume {typed}`", path=typed)
+
+    def fail():
+        with file.errors_in_words(path, "do it"):
+            raise error
+
+    assert said(fail) == f"{path}: microrad could not do it: {wanted}"
+
+
+def test_an_error_of_the_file_system_and_a_damaged_text_are_told_in_words(tmp_path):
+    def fail(error):
+        with file.errors_in_words(tmp_path / "a b", "do it"):
+            raise error
+
+    begin = f"{tmp_path / 'a b'}: microrad could not do it: "
+    assert said(fail, OSError(28, "No space")) == f"{begin}No space"
+    assert said(fail, OSError("odd")) == f"{begin}odd"
+    damaged = said(fail, UnicodeDecodeError("utf-8", b"x", 0, 1, "odd"))
+    assert damaged.startswith(f"{begin}the file is damaged (a text in it is none). `microrad campaign resume '")
+    assert file._safe(tmp_path / "none") == ""
+
+
+def test_what_is_there_or_not_is_told_in_full(tmp_path):
+    other, there, folder = tmp_path / "a.txt", tmp_path / "b c.ledger", tmp_path / "d"
+    other.write_text("mine")
+    folder.mkdir()
+    Ledger.create(there, HEAD).close()
+    assert said(file.refuse_existing, other) == (
+        f"there is already {other}, which is no ledger, and it stays: name another with --ledger"
+    )
+    assert said(file.refuse_existing, there) == (
+        f"there is already {there}: go on with `microrad campaign resume '{there}'`, or name another with --ledger"
+    )
+    assert said(file.refuse_existing, tmp_path / "no" / "x.ledger") == (
+        f"there is no folder {tmp_path / 'no'} for x.ledger: make it, or choose another"
+    )
+    assert said(file.refuse_foreign, folder) == (
+        f"{folder} is a folder, not a ledger: name the file that `microrad campaign run` wrote"
+    )
+    assert said(file.refuse_foreign, tmp_path / "x") == (
+        f"there is no ledger {tmp_path / 'x'}: begin the campaign with `microrad campaign run`"
+    )
+    assert said(file.refuse_foreign, other) == f"{other} is no ledger, or its first page is damaged: {ANEW}"
+    campaign = other.rename(tmp_path / "a b.toml")
+    assert said(file.refuse_foreign, campaign) == (
+        f"{campaign} is no ledger, or its first page is damaged: begin it with `microrad campaign run '{campaign}'`, "
+        "or name the file that this wrote"
+    )
+
+
+def test_every_fault_of_the_small_things_in_a_ledger_is_named(path):
+    with Ledger.create(path, HEAD, {"seconds": 2.5, "state": "running"}) as book:
+        book.put(0, 2, packed(2))
+        book.put(1, 0, packed(0, 1))
+        book.put_trace(TRACE)
+        book.put_trace(replace(TRACE, row=3))
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE notes SET value = '3.5' WHERE key = 'seconds'")
+        connection.execute("UPDATE traces SET row = 4 WHERE row = 3")
+        connection.execute("UPDATE chunks SET number = 7 WHERE cell = 1")
+        connection.execute("DELETE FROM head_again")
+    found = verify(path, [(1, 0), (0, 2), (0, 1), (1, 7)])
+    assert (found.checked, found.damaged, found.missing, found.sound) == (1, ((1, 7),), ((0, 1), (1, 0)), False)
+    head, trace, note = found.faults
+    assert head.startswith("copy 2 of the head: ")
+    assert trace == f"damaged among the traces: (0, 4, '{TRACE.output}')"
+    assert note == "damaged among the notes: ('seconds',)"
+    with Ledger.open(path, write=False) as book:
+        assert "seconds" not in book.notes() and book.notes()["state"] == "running"
+    mend(path)
+    with Ledger.open(path, write=False) as book:
+        assert book.done() == {(0, 2)} and [each.row for each in book.traces()] == [TRACE.row]
+        assert book.head == HEAD

@@ -666,3 +666,19 @@ def test_the_files_of_a_campaign_tell_it_apart_by_their_names_and_bytes_but_for_
     (tmp_path / "y.toml").write_text("x.toml")
     campaign.files = (*campaign.files[:2], tmp_path / "y.toml")
     assert now() != first
+
+
+@pytest.mark.parametrize(
+    ("drawn", "words"),
+    [
+        ({"mirror.bias": 900.0}, "mirror.bias = 900.0 V is outside drive_min to drive_max (0 V to 12 V)"),
+        (
+            {"amplifier.output_max": 12.5, "amplifier.gain": 62.5},
+            "mirror.bias = ? is outside amplifier.output_min to amplifier.output_max divided by amplifier.gain",
+        ),
+    ],
+)
+def test_what_does_not_fit_in_a_row_is_told_with_its_drawn_value_where_it_has_one(builder, drawn, words):
+    with pytest.raises(CampaignError) as refused:
+        builder.mission(0, drawn)
+    assert str(refused.value) == f"the row is no mission: {words}"
