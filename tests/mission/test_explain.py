@@ -107,3 +107,73 @@ def test_a_name_that_no_key_has_is_refused_with_what_is_near(asked, hint):
         explained(asked)
     assert str(told.value).startswith("no key of a mission or mirror file is called")
     assert len(str(told.value)) < 250
+
+
+@pytest.mark.parametrize(
+    ("asked", "name", "meaning", "holds", "default", "shipped"),
+    [
+        (
+            "operations.rates",
+            *("operations.rates", "stepped with range; absent: communication.data_rate alone"),
+            *('a list, rising, each item a data rate with its unit, above 0 bit/s; as ["5 Mbit/s"]', "nothing", ""),
+        ),
+        (
+            "constellation.relays",
+            *("constellation.relays", "one table for each, [constellation.relays.NAME]"),
+            *("a table for each, under a name of your own", "", ""),
+        ),
+        (
+            "hysteresis.1.weights",
+            *("hysteresis.NAME.weights", "of the plays, of either sign"),
+            *("a list, each item a number without quotes; as [5.0]", "nothing", ""),
+        ),
+        (
+            "bouc_wen.exponent",
+            *("bouc_wen.exponent", "of h in the decay; left out, 1 as in Eq. 3"),
+            *("a number without quotes, at least 1, at most 100; as 5.0", "1.0", ""),
+        ),
+        (
+            "point_ahead.corrected",
+            *("point_ahead.corrected", "false: both beams leave along the line of sight"),
+            *("true or false, without quotes; as true", ""),
+            "true # assumption: by the fine steering mirror; false leaves 71 urad in the pointing error",
+        ),
+        (
+            "terminals.leo_name",
+            *("terminals.leo_name", 'what budgets call it in place of "LEO"', "a text", "nothing", ""),
+        ),
+        (
+            "operations.optical.stations.a.availability",
+            "operations.optical.stations.NAME.availability",
+            "share of the time without clouds, one number or twelve by month",
+            "a number without quotes, at least 0, at most 1, or a list of 12 such, January to December; as 1.0",
+            *("", ""),
+        ),
+        (
+            "conventions.strehl",
+            *("conventions.strehl", "decibel: a loss in dB; ratio: a number up to 1; unused: no beam states one"),
+            *('"decibel" or "ratio" or "unused"', "unused"),
+            next(k.shipped for k in explained("conventions.strehl")),
+        ),
+    ],
+)
+def test_a_key_is_explained_with_all_that_its_table_says(asked, name, meaning, holds, default, shipped):
+    (found,) = explained(asked)
+    assert (found.name, found.meaning, found.holds, found.default, found.shipped) == (
+        name,
+        meaning,
+        holds,
+        default,
+        shipped,
+    )
+
+
+def test_a_key_for_a_terminal_has_a_line_for_each_fact():
+    key = explain.Key("mission file", "a.b", "what it is", "a text", "", "", ("m.one", "m.two"), ("c", "d"))
+    assert explain.text([key, key], 24) == "\n\n".join(
+        [
+            "a.b (mission file)\n  means     what it is\n  holds     a text\n  left out  it must be\n "
+            "           there\n  keys      c, d\n  read by   m.one, m.two"
+        ]
+        * 2
+    )

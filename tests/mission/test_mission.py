@@ -2116,3 +2116,122 @@ ALL_OF_A_TEXT = {
 def test_what_is_read_of_a_text_and_what_is_told_of_its_faults(what):
     call, words = ALL_OF_A_TEXT[what]
     assert one_line(str(call())) == one_line(words)
+
+
+def faults_of(text, load=load_mission):
+    """Every fault of a file with this text, in its words."""
+    with pytest.raises(MissionError) as refused:
+        load("m.toml", text=text)
+    return "; ".join(f"{f.key} = {f.value} {f.reason}: {f.expected} ({f.nearest})" for f in refused.value.faults)
+
+
+ALL_OF_A_FILE = {
+    "an unknown key that stands for a missing one": (
+        lambda: faults_of(edited("communication.transmit_power", "5", renamed="transmitt_power")),
+        """
+        communication.transmitt_power = is no key of [communication]: one of transmit_power, wavelength, strehl,
+        wavefront_error, pointing_error, distance, transmit_optics_loss, receive_optics_loss, data_rate,
+        tracking_split_loss, implementation_loss, receiver_sensitivity, receiver, code_word, beam, coupling, fading
+        (transmit_power)
+        """,
+    ),
+    "a table in place of a value": (
+        lambda: faults_of(edited("mirror.travel", "{a = 1}")),
+        """
+        mirror.travel = (a table) is not a quantity in quotes: an angle with its unit; for example travel = "5 urad"
+        ()
+        """,
+    ),
+    "two wrong lists and a wrong word": (
+        lambda: faults_of(
+            edited(
+                "scenario.pid_frequencies",
+                "[1, 2]",
+                edited("conventions.strehl", '"decibels"', edited("scenario.inverse_frequencies", '["5 Hz", "2 Hz"]')),
+            )
+        ),
+        """
+        conventions.strehl = "decibels" is none of the choices: strehl = "decibel" or strehl = "ratio" or strehl =
+        "unused" ("decibel"); scenario.pid_frequencies = [1, 2] item 1: 1 is a number without a unit; expected a
+        frequency with its unit, for example "1 Hz": a list, rising, each item a frequency with its unit, above 0
+        Hz, at most 1 THz (); scenario.pid_frequencies = [1, 2] item 2: 2 is a number without a unit; expected a
+        frequency with its unit, for example "2 Hz": a list, rising, each item a frequency with its unit, above 0
+        Hz, at most 1 THz (); scenario.inverse_frequencies = ["5 Hz", "2 Hz"] does not rise from item to item: a
+        list, rising, each item a frequency with its unit, above 0 Hz, at most 1 THz ()
+        """,
+    ),
+    "a name of nothing": (
+        lambda: faults_of(edited("name", '""')),
+        """name = "" is of the wrong kind: text in quotes, for example name = "a name" ()""",
+    ),
+    "a switch and a count in quotes": (
+        lambda: faults_of(edited("point_ahead.corrected", '"true"', edited("acquisition.attempts", '"3"'))),
+        """
+        point_ahead.corrected = "true" is neither true nor false: true or false, without quotes; for example
+        corrected = true (); acquisition.attempts = "3" is not a whole number: a whole number without quotes, from 1
+        to 1000; for example attempts = 2 ()
+        """,
+    ),
+    "a missing key of each kind": (
+        lambda: faults_of(edited("conventions.residual", None, edited("requirement.outage", None))),
+        """
+        conventions.residual = is missing: residual = "per-axis" or residual = "radial" (); requirement.outage = is
+        missing: a number without quotes, above 0 and below 1; for example outage = 0.5 ()
+        """,
+    ),
+    "a mirror beside its file": (
+        lambda: faults_of(edited("mirror.name", '"a"\nfile = "b.toml"')),
+        """
+        mirror.file = "b.toml" stands beside other keys of the mirror: file = "mirror.toml" alone in [mirror], or
+        all of its other keys ()
+        """,
+    ),
+    "a mirror of version 2": (
+        lambda: faults_of(NO_MIRROR + "[mirror]\nversion = 2\n" + REST),
+        """
+        mirror.version = holds a mirror of several axes, and the paper's loop has one: a mirror file of one axis
+        here, and this one in the fine-pointing loop: fine_pointing.mirror_file; microrad design and microrad export
+        take it by --mirror, too ()
+        """,
+    ),
+    "a mirror of version 3": (
+        lambda: faults_of(NO_MIRROR + MIRROR.replace("[mirror]\n", "[mirror]\nversion = 3\nmodes = 1\n", 1) + REST),
+        """
+        mirror.version = is no version of a mirror of one axis: version = 2 for a mirror of several axes, and no
+        version for one axis (); mirror.modes = is a key of version 2, in a mirror of one axis: this table removed,
+        or version = 2 with its keys alone ()
+        """,
+    ),
+    "a mirror without its version": (
+        lambda: faults_of(NO_MIRROR + "[mirror]\nmatrices = 1\noutputs = 2\n" + REST),
+        """
+        mirror.version = is missing, and outputs is a key of version 2: version = 2 in the first line ()
+        """,
+    ),
+    "a file of one axis for several": (
+        lambda: faults_of('creep = 1\ntravel = "1 mrad"\n', load_coupled_mirror),
+        """
+        mirror.version = is missing, and travel is a key of version 1: the file holds a mirror of one axis: a file
+        of version 2; microrad.mission.file.load_mirror reads this one ()
+        """,
+    ),
+    "a file of several axes with keys of one": (
+        lambda: faults_of('version = 1\nname = "a"\ncreep = 1\nlinear = 2\nmodes = 3\n', load_coupled_mirror),
+        """
+        mirror.actuators = is missing: a table with the keys name, bias, drive_min, drive_max, rate_limit ();
+        mirror.outputs = is missing: a table with the keys name, quantity, position (); mirror.recording = is
+        missing: a table with the keys delay, rate, steps_per_sample, excited_from, excited_to (); mirror.matrices =
+        is missing: a table with the keys B, C, D, E, F, G, K (); mirror.version = 1 is no version of a mirror of
+        several axes: version = 2 for a mirror of several axes, and no version for one axis (); mirror.creep = 1 is
+        a key of version 1, in a file of version 2: a real mode in [modes] for each of its lags (); mirror.linear =
+        2 is a key of version 1, in a file of version 2: the tables [modes] and [matrices] in its place ();
+        mirror.modes = 3 is of the wrong kind: a table with the keys decay, frequency ()
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", ALL_OF_A_FILE)
+def test_all_faults_of_a_file_are_told_in_full(what):
+    call, words = ALL_OF_A_FILE[what]
+    assert one_line(str(call())) == one_line(words)

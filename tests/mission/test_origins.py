@@ -118,3 +118,31 @@ def test_a_comment_that_is_shipped_with_several_values_speaks_of_none():
     said = {s.value for p in presets() for s in scan(p.text) if s.key == "terminals.leo_name"}
     assert len(said) > 2
     assert origins.written_for("terminals.leo_name", "assumption: what budgets call it", '"MYSAT"') == ""
+
+
+@pytest.mark.parametrize(
+    ("value", "other", "same"),
+    [
+        ('["1 km", 2, true]', '["1000 m", 2.0, true]', True),
+        ('["1 km", 2]', '["1000 m", 3]', False),
+        ("[1]", "[1, 2]", False),
+        ("1", "true", False),
+        ('"a b"', '"a  b"', False),
+        ('"5 W"', '"5 m"', False),
+        ('"5 W"', "5", False),
+        ("x", "x", True),
+        ("x", "y", False),
+        ('"622.08 Mbit/s"', '"0.62208 Gbit/s"', True),
+    ],
+)
+def test_two_values_are_one_where_they_mean_the_same(value, other, same):
+    assert origins._same(value, other) is same
+    assert origins._same(other, value) is same
+
+
+def test_a_value_is_shipped_for_its_own_key_alone():
+    assert origins.is_shipped("terminals.leo_aperture", '"50 mm"')
+    assert not origins.is_shipped("terminals.geo_aperture", '"5 cm"')
+    assert not origins.is_shipped("terminals.leo_apertures", '"5 cm"')
+    assert origins.of_paper("terminals.leo_aperture", '"6 cm"') == '"5 cm"'
+    assert origins.of_paper("terminals.leo_aperture", '"50 mm"') == origins.of_paper("terminals.none", '"6 cm"') == ""

@@ -118,7 +118,10 @@ def test_one_value_left_unknown_is_still_refused(tmp_path, name):
 
 @pytest.mark.promise("link-54")
 def test_a_crosslink_begins_with_less_than_25_lines(tmp_path):
-    """Whole, with its comments: it is the file that one changes into one's own link."""
+    """
+
+
+    Whole, with its comments: it is the file that one changes into one's own link."""
     text = preset_text("crosslink")
     assert len(text.splitlines()) == 24
     path = tmp_path / "crosslink.toml"
@@ -292,3 +295,16 @@ def test_a_table_can_be_unknown(tmp_path, table):
 def test_an_example_without_its_unit_is_the_number_where_that_is_allowed(value, example):
     with pytest.raises(UnitError, match=f'for example "{re.escape(example)}"$'):
         Quantity("W", above=0.0, most=20.0).read(value)
+
+
+    ("name", "hint"),
+    [
+        ("oicets", "did you mean oicets-artemis?"),
+        ("TBIRDS", "did you mean tbird or dsoc?"),
+        ("z" * 61, f"there are {', '.join(NAMES)}"),
+    ],
+)
+def test_a_preset_that_is_none_is_told_with_those_near_or_with_all(name, hint):
+    with pytest.raises(ValueError) as refused:
+        preset_text(name)
+    assert str(refused.value) == f'there is no preset "{name[:60]}"; {hint}'

@@ -269,3 +269,67 @@ ALL_OF_A_BUDGET = {
 def test_all_that_does_not_fit_in_a_budget_is_told_in_full(what):
     problems, words = ALL_OF_A_BUDGET[what]
     assert told(problems()) == one_line(words)
+
+
+@pytest.mark.parametrize(
+    ("rows", "head", "said"),
+    [
+        (
+            ["a,constant,1 urad,,fixed,together,q,1"],
+            HEADING,
+            ', row 2, x: "q" is no number; give the gain to that axis',
+        ),
+        (
+            ["a,constant,1 urad,,fixed,together,1,1", "b,constant,-1 urad,,fixed,together,1,1"],
+            *(HEADING, ", row 3, b: size is below 0 rad; expected an angle with its unit, at least 0 rad, at most "),
+        ),
+        (
+            ["a,process,1 urad,,2-sigma,together,1,1"],
+            HEADING,
+            ', row 2, a: corner is missing, and class = "process" needs it; expected corner = ',
+        ),
+        (["a,constant,1 urad,,fixed,both,1,1"], HEADING, ', row 2, a: axes is "both": input should be '),
+        (["a,constant,1 urad"], "name,class,size,statistic,axes,x", ", row 2, a: statistic is missing"),
+        (
+            [f"{'a' * 70},constant,1 urad,,fixed,each,,1"],
+            HEADING,
+            f", row 2, {'a' * 59}…: x is empty before y; give 0 where nothing gets there",
+        ),
+        ([",constant,1 urad,,fixed,each,1,1"], HEADING, ", row 2: has no name; give it one"),
+        (
+            ["a,constant"],
+            *(
+                HEADING.replace("size", "length"),
+                ': no column is called "length"; its first row names columns out of name, class, size, rate, '
+                "statistic, axes, corner, frequency, period, decay, x, y, z, origin",
+            ),
+        ),
+        (["a,constant"], HEADING + ",x", ": two columns have one name; rename one of them"),
+        ([], HEADING, ": holds no source; give a row for each below the names of the columns"),
+    ],
+)
+def test_what_a_list_of_sources_lacks_is_told_with_row_name_and_remedy(tmp_path, rows, head, said):
+    path = listed(tmp_path, *rows, head=head)
+    with pytest.raises(SourceListError) as refused:
+        read_sources(path)
+    assert str(refused.value).startswith(f"{path}{said}")
+
+
+def test_a_list_that_is_not_there_or_no_text_says_what_to_do(tmp_path):
+    (tmp_path / "other.csv").write_bytes(b"\xff\xfe\x00name")
+    for name, said in (
+        ("none.csv", "cannot be read (No such file or directory); check the path"),
+        ("other.csv", "is no text in UTF-8; save it as CSV in UTF-8, or as .xlsx"),
+    ):
+        with pytest.raises(SourceListError) as refused:
+            read_sources(tmp_path / name)
+        assert str(refused.value) == f"{tmp_path / name}: {said}"
+
+
+def test_three_axes_a_rate_and_an_origin_of_a_list_are_those_of_its_row(tmp_path):
+    head = "Origin;NAME;class;rate;;period;statistic;axes;z;x;y"
+    path = listed(tmp_path, "of ours;slow;drift;2.5 nrad/s;;1.5 h;fixed;each;-0.25;0.5;0.0", head=head)
+    (found,) = read_sources(path)
+    assert (found.name, found.origin, found.source.kind, found.source.axes) == ("slow", "of ours", "drift", "each")
+    assert (found.source.gains, found.source.statistic, found.source.size_rad) == ((0.5, 0.0, -0.25), "fixed", None)
+    assert (found.source.rate_rad_s, found.source.period_s) == pytest.approx((2.5e-9, 5400.0))
