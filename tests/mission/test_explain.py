@@ -177,3 +177,11 @@ def test_a_key_for_a_terminal_has_a_line_for_each_fact():
         ]
         * 2
     )
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(None, "nothing"), ((), "nothing"), ({}, "nothing"), (0.0, "0.0"), (False, "false"), (True, "true"), ("a", "a")],
+)
+def test_what_counts_where_a_key_is_left_out_is_told_as_a_file_has_it(value, words):
+    assert explain._default(value) == words

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import replace
+from dataclasses import astuple, replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -14,6 +14,7 @@ import budgets
 from made_tables import one_line
 from microrad import link
 from microrad.core import kernels
+from microrad.core.units import format_quantity
 from microrad.link import study as link_study
 from microrad.link.acquisition import sequence as acquisition
 from microrad.loop import control, controller_study
@@ -1259,3 +1260,76 @@ ALL_OF_A_CONTACT = {
 def test_what_a_contact_does_and_refuses_is_told_in_full(what):
     call, words = ALL_OF_A_CONTACT[what]
     assert one_line(str(call())) == one_line(words)
+
+
+def test_a_window_has_every_number_of_its_samples(sampler, file):
+    s = sampler()
+    ends = Sight(np.array([40e6, 41e6]), np.array([90e-6, 95e-6]), np.array([28e-6, 29e-6]))
+    time, radial = 1000.0 + 2e-4 * np.arange(5), np.array([3.0, 1.0, 4.0, 1.0, 5.0]) * 1e-6
+    margin = np.array([2.0, -1.0, 0.0, -3.0, 5.0])
+    loss = Loss(1000.0, 1000.1, 1000.2, "dark")
+    found = s._window(ends, np.array([7e-6, -8e-6]), loss, (time, radial, margin))
+    assert (found.start_s, found.seconds, found.range_m) == (1000.0, pytest.approx(1e-3), 40e6)
+    assert (found.point_ahead_rad, found.rate_rad_s, found.loss) == (28e-6, 90e-6, loss)
+    assert found.rms_rad == pytest.approx(1e-6 * math.sqrt(52.0 / 5.0))
+    assert found.quantile_rad == pytest.approx(np.quantile(radial, file.mission.fine_pointing.quantile))
+    assert (found.largest_rad, found.lowest_margin_db, found.share_below) == (radial[4], -3.0, 0.4)
+    assert found.mirror_rad == (7e-6, -8e-6)
+
+
+def test_a_window_lies_between_its_ends_in_the_share_of_its_length(sampler):
+    s = sampler()
+    ends = Sight(np.array([40e6, 48e6]), np.array([90e-6, 98e-6]), np.array([28e-6, 32e-6]))
+    between = drawn_windows._between(ends, np.array([0.0, 0.25, 1.0]))
+    assert_allclose(between.range_m, [40e6, 42e6, 48e6])
+    assert_allclose(between.rate_rad_s, [90e-6, 92e-6, 98e-6])
+    assert_allclose(between.point_ahead_rad, [28e-6, 29e-6, 32e-6])
+    error, angle = np.zeros((12, 2)), np.zeros((12, 2))
+    window = s._of(1000.0, ends, 4 * s.loop.timing.period_s, error, angle, 8)
+    far = [float(s.margin_db(np.zeros(1), drawn_windows._between(ends, np.array([k / 4.0])))[0]) for k in range(4)]
+    assert_allclose(window.margin_db, far, rtol=1e-9)
+
+
+def test_references_of_a_moment_move_with_what_is_left_of_both_rates(sampler):
+    s = sampler()
+    table = s.table.model_copy(
+        update={
+            "reference": s.table.reference.model_copy(update={"rate_feedforward": 0.75, "point_ahead_on_mirror": True}),
+            "body": s.table.body.model_copy(update={"bandwidth_hz": 0.125}),
+        }
+    )
+    ends = Sight(np.array([40e6, 41e6]), np.array([90e-6, 98e-6]), np.array([28e-6, 30e-6]))
+    moving, *others = replace(s, table=table)._moving(ends, 4.0, 0.5)
+    assert astuple(moving) == pytest.approx(
+        astuple(
+            MovingReference(
+                point_ahead_rad=28e-6 - 0.5e-6 * 0.5,
+                line_of_sight_rate_rad_s=0.25 * 90e-6 - 0.5e-6 * 0.5,
+                body_bandwidth_hz=0.125,
+                point_ahead_rate_rad_s=0.5e-6,
+                acceleration_rad_s2=0.5e-6,
+            )
+        ),
+        rel=1e-9,
+    )
+    assert others == list(s.loop.references[1:])
+
+
+def test_a_loss_by_the_margin_and_one_by_the_spot_are_told_with_every_number(sampler):
+    s = sampler(how=settings(hold_s=0.001))
+    time, ends = 1000.0 + 2e-4 * np.arange(40), Sight(*(np.array([v, 1.2 * v]) for v in (40e6, 90e-6, 28e-6)))
+    margin = np.where(np.arange(40) >= 10, -1.0, 1.0)
+    radial = np.where(np.arange(40) == 12, 23.4e-6, 11e-6)
+    loss, kept = s._loss(time, radial, margin, ends, 0)
+    assert (kept, loss.since_s, loss.time_s) == (16, pytest.approx(1000.002), pytest.approx(1000.0032))
+    assert loss.cause == "margin below 0 dB for 1.2 ms at 1000.002 s: 23 µrad off, range 42000 km"
+    assert loss.known_s - loss.time_s == pytest.approx(2.0 * 42e6 / C_M_S)
+    seen = s.loop.optical.field_of_view_rad
+    far = np.where(np.arange(40) == 3, 1.25 * seen, 0.0)
+    loss, kept = replace(s, loop=replace(s.loop, optical=replace(s.loop.optical, every=1)))._loss(
+        time, far, margin, ends, 0
+    )
+    assert kept == 4
+    sees = f"{format_quantity(1.25 * seen, 'rad', 2)} off, it sees {format_quantity(seen, 'rad')}"
+    assert loss.cause == f"spot beyond the optical sensor's field of view at 1000.001 s: {sees}"
+    assert (loss.time_s, loss.known_s) == (pytest.approx(1000.0008), loss.time_s)

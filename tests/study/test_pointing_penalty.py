@@ -86,3 +86,55 @@ def test_an_ensemble_is_its_mean_and_what_moves_about_it(told, monkeypatch, axes
     mean_square = np.sum(spread.share * spread.radius_rad**2)
     exact = 0.8 * (edges[3] ** 2 + edges[4] ** 2) / 2 + 0.2 * (edges[10] ** 2 + edges[11] ** 2) / 2
     assert mean_square == pytest.approx(exact, rel=1e-12)
+
+
+def test_cases_of_a_link_are_those_of_each_sine_and_each_controller_on_each_mirror(monkeypatch):
+    monkeypatch.setattr(pointing_penalty, "stated_outage", lambda requirement: requirement + 0.25)
+    monkeypatch.setattr(
+        pointing_penalty, "_sine", lambda data, radial, run: case(f"sine {run}", "PID", Variant.GIVEN, float(radial))
+    )
+    monkeypatch.setattr(
+        pointing_penalty,
+        "_fine",
+        lambda data, fine, v, mirror: case("noise", v.name, mirror, fine[v.name, mirror], 2.0),
+    )
+    left = {("PI", Variant.GIVEN): 3.0, ("PI", Variant.STRAIGHT): 5.5, ("LQG", Variant.GIVEN): 4.0}
+
+    class Fine(dict):
+        verified = (
+            SimpleNamespace(name="PI", simulated={Variant.GIVEN: 0, Variant.STRAIGHT: 0}),
+            SimpleNamespace(name="LQG", simulated={Variant.GIVEN: 0}),
+        )
+
+    data = SimpleNamespace(requirement=0.5, beam=SimpleNamespace(fall=SimpleNamespace(half_angle_rad=6e-6)))
+    for residual, radial in (("radial", 1.0), ("per-axis", 0.0)):
+        found = pointing_penalty.performance_of_loops(data, residual, ("a", "b"), Fine(left))
+        assert (found.outage, found.half_angle_rad) == (0.75, 6e-6)
+        told = [(c.source, c.controller, c.mirror, c.margin_db) for c in found.cases]
+        assert told == [
+            ("sine a", "PID", Variant.GIVEN, radial),
+            ("sine b", "PID", Variant.GIVEN, radial),
+            ("noise", "PI", Variant.GIVEN, 3.0),
+            ("noise", "PI", Variant.STRAIGHT, 5.5),
+            ("noise", "LQG", Variant.GIVEN, 4.0),
+        ]
+        assert [(c.source, c.controller, c.mirror, c.margin_db) for c in found.costs] == [
+            ("noise", "PI", "given", -2.5)
+        ]
+    assert len(pointing_penalty.performance_of_loops(data, "radial", ("a",), None).cases) == 1
+
+
+def test_errors_in_bins_lie_evenly_in_the_square_and_have_their_quantiles():
+    edges = bin_edges_rad()
+    counts = np.zeros(edges.size - 1, dtype=np.int64)
+    counts[[7, 8, 20]] = 6, 3, 1
+    binned = pointing_penalty.Binned.of(counts)
+    assert binned.radius_rad.size == binned.share.size == 32 * counts.size
+    seventh = slice(32 * 7, 32 * 8)
+    squares = edges[7] ** 2 + (edges[8] ** 2 - edges[7] ** 2) * (np.arange(32) + 0.5) / 32
+    np.testing.assert_allclose(binned.radius_rad[seventh], np.sqrt(squares), rtol=1e-12)
+    np.testing.assert_allclose(binned.share[seventh], 0.6 / 32, rtol=1e-12)
+    assert binned.share[32 * 20] == pytest.approx(0.1 / 32) and binned.share[32 * 9] == 0.0
+    middle = math.sqrt(edges[7] ** 2 + 0.5 * (edges[8] ** 2 - edges[7] ** 2))
+    assert binned.quantile_rad(0.3) == pytest.approx(middle, rel=1e-12)
+    assert binned.quantile_rad(0.9) == pytest.approx(edges[9], rel=1e-12)

@@ -524,3 +524,123 @@ ALL_OF_A_CLAIM = {
 def test_a_claim_beside_ours_is_told_in_full(what):
     call, words = ALL_OF_A_CLAIM[what]
     assert one_line(str(call())) == one_line(words)
+
+
+def derived_and_other():
+    """Sources of which those of two tables are derived, one of them changed since."""
+
+    def of(kind, was=""):
+        return SimpleNamespace(kind=kind, value='"1 W"', comment=f"{kind}: the {kind}", was=was)
+
+    return {
+        "communication.a": of("derived"),
+        "communication.b": of("derived", "2"),
+        "beacon.a": of("derived"),
+        "error_budget.sources.s.size": of("derived"),
+        "error_budget.requirements.code_word.limit": of("derived"),
+        "error_budget.requirements.code.limit": of("derived"),
+    }
+
+
+REQUIRED = SimpleNamespace(margin_db=3.25, pointing_error_rad=12.5e-6, outage=0.0125)
+
+
+@pytest.mark.parametrize(("possible", "known"), [(True, True), (False, True), (True, False), (False, False)])
+def test_the_residual_and_the_margin_under_it_have_every_field_of_their_lines(monkeypatch, possible, known):
+    monkeypatch.setattr(verdict.mirror_summary, "unknown_dynamics", lambda table: "" if known else "unknown")
+    achieved = SimpleNamespace(margin_db=4.5, possible=possible)
+    mirrors, lacking = SimpleNamespace(table="the mirror"), "dynamics of the mirror, which its model does not have"
+    lines = verdict.of_residual(REQUIRED, mirrors, derived_and_other(), achieved, 10e-6, "lag")
+    doubt = "" if known else lacking
+    too_near = "its budget has more light arrive than was sent: the terminals are too near for it"
+    assert lines == (
+        Requirement("residual", "residual pointing error", "rad", 12.5e-6, 10e-6, 12.5e-6 - 10e-6, "lag", doubt, ()),
+        Requirement(
+            "communication",
+            "communication margin",
+            "dB",
+            3.25,
+            4.5,
+            1.25,
+            "the residual: lag",
+            doubt if possible else too_near,
+            ("communication.a = 1 W (the derived)",),
+        ),
+    )
+
+
+@pytest.mark.parametrize("unknown", ["", "unknown"])
+def test_the_fine_loop_has_every_field_of_its_lines(monkeypatch, unknown):
+    monkeypatch.setattr(verdict, "_stroke", lambda sources, fine: "the stroke")
+    given = SimpleNamespace(quantile_rad=15e-6)
+    fine = SimpleNamespace(
+        best=SimpleNamespace(design=SimpleNamespace(name="LQG"), simulated={Variant.GIVEN: given, Variant.STRAIGHT: 0}),
+        budget=SimpleNamespace(dominant="noise"),
+        scene=SimpleNamespace(unknown_dynamics=unknown),
+        quantile=0.9975,
+    )
+    case = SimpleNamespace(margin_db=2.75, possible=True)
+    doubt = "dynamics of the mirror, which its model does not have" if unknown else ""
+    stroke, error, margin = verdict.of_fine_pointing(REQUIRED, derived_and_other(), fine, case)
+    assert stroke == "the stroke"
+    name = "fine pointing at 99.75 % (LQG)"
+    assert error == Requirement("fine pointing", name, "rad", 12.5e-6, 15e-6, 12.5e-6 - 15e-6, "noise", doubt, ())
+    derived = ("communication.a = 1 W (the derived)",)
+    name = "link margin for 98.75 % of the time (LQG)"
+    assert margin == Requirement("communication", name, "dB", 3.25, 2.75, -0.5, "noise", doubt, derived)
+    assert not margin.met and not error.met
+
+
+def test_a_budget_of_errors_has_a_line_for_each_requirement_with_its_own_inputs():
+    def judged(name, kind, limit_rad, found_rad, *shares):
+        required = SimpleNamespace(limit_rad=limit_rad, index=SimpleNamespace(kind=kind))
+        total = SimpleNamespace(required=required, quantile_rad=found_rad)
+        return SimpleNamespace(name=name, total=total, shares=[SimpleNamespace(name=each) for each in shares])
+
+    budget = SimpleNamespace(
+        judged=[
+            judged("code_word", "RPE", 5e-6, 4e-6, "star_tracker_a", "x"),
+            judged("code", "APE", 3e-6, 8e-6, "loop"),
+        ]
+    )
+    first, second = verdict.of_error_budget(budget, derived_and_other(), None)
+    sources = "error_budget.sources.s.size = 1 W (the derived)"
+    assert first == Requirement(
+        *("error budget", "code word (RPE)", "rad", 5e-6, 4e-6, 5e-6 - 4e-6, "star tracker a", ""),
+        (sources, "error_budget.requirements.code_word.limit = 1 W (the derived)"),
+    )
+    assert (second.name, second.margin, second.limited_by) == ("code (APE)", 3e-6 - 8e-6, "loop")
+    assert second.derived == (sources, "error_budget.requirements.code.limit = 1 W (the derived)")
+    fine = SimpleNamespace(scene=SimpleNamespace(unknown_dynamics="unknown"))
+    doubts = [line.unknown for line in verdict.of_error_budget(budget, {}, fine)]
+    assert doubts == ["dynamics of the mirror, which its model does not have"] * 2
+    assert first.mark == "derived" and second.mark == "FAIL"
+    assert (first.because, verdict.of_error_budget(budget, {}, fine)[0].because) == ("star tracker a", doubts[0])
+
+
+@pytest.mark.parametrize(
+    ("time_s", "words"),
+    [(0.25, "0.25 s"), (59.4, "59 s"), (59.99, "60 s"), (60.0, "1 min"), (99.0, "1.6 min"), (math.inf, "never")],
+)
+def test_a_time_is_told_in_its_unit(time_s, words):
+    assert verdict._minutes(time_s) == words
+
+
+def test_the_claims_come_in_the_order_of_the_paper_and_those_without_a_base_are_left_out(monkeypatch):
+    for name in ("_link_claims", "_drop_claims", "_day_claims"):
+        monkeypatch.setattr(verdict, name, lambda *given, name=name: (f"{name} 1", f"{name} 2"))
+    for name in ("_travel_claim", "_linear_claim", "_loops_claim", "_worse_claim", "_together_claim"):
+        monkeypatch.setattr(verdict, name, lambda *given, name=name: name)
+
+    def claims(linear=0, scan=0, day=0):
+        cases = SimpleNamespace(mirrors=SimpleNamespace(table=SimpleNamespace(linear=linear)))
+        return verdict.against_paper(verdict.Evidence("a", cases, (), "s", (), scan, day))
+
+    links, drops = ("_link_claims 1", "_link_claims 2"), ("_drop_claims 1", "_drop_claims 2")
+    assert claims() == (
+        *links,
+        *("_travel_claim", "_linear_claim", "_loops_claim", "_worse_claim"),
+        *drops,
+        *("_together_claim", "_day_claims 1", "_day_claims 2"),
+    )
+    assert claims(None, None, None) == (*links, "_travel_claim", "_loops_claim", "_worse_claim", *drops)
