@@ -1207,3 +1207,63 @@ ALL_OF_SEVERAL_AXES = {
 def test_all_that_does_not_fit_in_a_mirror_of_several_axes_is_told_in_full(what):
     problems, words = ALL_OF_SEVERAL_AXES[what]
     assert told(problems()) == one_line(words)
+
+
+def test_a_mirror_has_a_number_for_each_parameter_by_its_key():
+    modes = made(ModesTable, decay_1_s=(5.0, 3.0), frequency_rad_s=(40.0, 0.0))
+    loop = made(HysteresisTable, model="bouc-wen", d1=0.5, epsilon=-0.25, alpha_1_v=2.0, beta_1_v=0.75, exponent=1.5)
+    mirror = two_by_three(
+        modes,
+        (plays(0.25, 0.125, widening_s=2e-6, polynomial=(0.1, 0.2, 0.3)), loop),
+        D=((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)),
+    ).model_copy(update={"recording": made(RecordingTable, delay_s=1e-4)})
+    assert parameters(mirror) == {
+        "recording.delay": 1e-4,
+        "modes.decay.1": 5.0,
+        "modes.decay.2": 3.0,
+        "modes.frequency.1": 40.0,
+        **{f"matrices.D.{i}.{j}": 3.0 * i + j - 3.0 for i in (1, 2) for j in (1, 2, 3)},
+        "hysteresis.1.thresholds.1": 0.0,
+        "hysteresis.1.thresholds.2": 1.0,
+        "hysteresis.1.weights.1": 0.25,
+        "hysteresis.1.weights.2": 0.125,
+        "hysteresis.1.widening": 2e-6,
+        "hysteresis.1.polynomial.1": 0.1,
+        "hysteresis.1.polynomial.2": 0.2,
+        "hysteresis.1.polynomial.3": 0.3,
+        "hysteresis.2.d1": 0.5,
+        "hysteresis.2.epsilon": -0.25,
+        "hysteresis.2.alpha": 2.0,
+        "hysteresis.2.beta": 0.75,
+        "hysteresis.2.exponent": 1.5,
+    }
+    assert (mirror.states, modes.states, modes.roots) == (3, 3, ((-5.0, 40.0), (-3.0, 0.0)))
+    sides = {name: mirror.shape_of(name) for name in "BCDEFGK"}
+    states, drives, outputs, elements = (3, "states"), (3, "actuators"), (2, "outputs"), (2, "elements")
+    assert sides == {
+        "B": (states, drives), "C": (outputs, states), "D": (outputs, drives), "E": (states, elements),
+        "F": (elements, states), "G": (elements, drives), "K": (outputs, elements),
+    }  # fmt: skip
+
+
+def test_parameters_that_are_none_or_stand_twice_are_told_with_the_nearest():
+    mirror = two_by_three().model_copy(update={"recording": made(RecordingTable, delay_s=1e-4)})
+    uncertainty = SimpleNamespace(parameters=("modes.decay.1", "modes.decy.1", "zzz", "modes.decay.1", "zzz"))
+    none = 'which is no parameter of this mirror: expected such as "modes.decay.1"'
+    twice = "more than once: expected each parameter once"
+    assert told(coupled_mirror._name_problems(mirror, uncertainty)) == "; ".join(
+        f"uncertainty.parameters has {each}"
+        for each in (
+            f'"modes.decy.1", {none}',
+            f'"zzz", {none}',
+            f'"zzz", {none}',
+            f'"modes.decay.1" {twice}',
+            f'"zzz" {twice}',
+        )
+    )
+
+
+def test_the_correlation_of_several_axes_is_whole_from_its_lower_triangle():
+    table = made(UncertaintyTable, parameters=("a", "b", "c"), correlation=(0.1, 0.2, 0.3))
+    assert table.correlation_matrix.tolist() == [[1.0, 0.1, 0.2], [0.1, 1.0, 0.3], [0.2, 0.3, 1.0]]
+    assert made(UncertaintyTable, parameters=("a", "b")).correlation_matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]

@@ -834,3 +834,23 @@ ALL_OF_A_LOOP = {
 def test_all_that_does_not_fit_in_a_table_of_the_loop_is_told_in_full(what):
     problems, words = ALL_OF_A_LOOP[what]
     assert told(problems()) == one_line(words)
+
+
+@pytest.mark.parametrize(
+    ("coupling", "cosine", "singular"),
+    [
+        ((1.0, 0.0, 0.0, 1.0), 1.0, False),
+        ((1.0, 0.0, 0.0, 1.01e-4), 1.0, False),
+        ((1.0, 0.0, 0.0, 0.99e-4), 1.0, True),
+        ((1.0, 0.0, 0.0, 2e-4), 0.49, True),
+        ((1.0, 0.0, 0.0, 2e-4), 0.51, False),
+        ((0.0, 3.0, -2.0, 0.0), 0.5, False),
+        ((1.0, 2.0, 2.0, 4.0), 1.0, True),
+        ((1.0, 2.0, -2.0, 1.0), 1.1e-4, False),
+        ((1.0, 2.0, -2.0, 1.0), 0.9e-4, True),
+    ],
+)
+def test_a_coupling_is_singular_beyond_a_condition_of_ten_thousand(coupling, cosine, singular):
+    matrix = np.diag([1.0, cosine]) @ np.array(coupling).reshape(2, 2)
+    assert bool(np.linalg.cond(matrix) > 1e4) is singular
+    assert fine_pointing_table._singular(coupling, cosine) is singular

@@ -1062,3 +1062,64 @@ ALL_OF_A_LINK = {
 def test_all_that_does_not_fit_in_a_table_of_a_link_is_told_in_full(what):
     problems, words = ALL_OF_A_LINK[what]
     assert told(problems()) == one_line(words)
+
+
+def counted(**changes):
+    """A counter of switched light behind a background, with a code of its own."""
+    given = {"modulation": "ook", "detector": "photon-counting", "bit_error_ratio": 2.5e-7, "code_rate": 0.4375}
+    given |= {"efficiency": 0.625, "dark_count_rate_1_s": 1250.0, "background_power_w": 2.5e-12, "code_gain_db": 3.25}
+    return made(Receiver, **given | changes)
+
+
+def test_counts_without_signal_are_those_of_background_and_dark_for_each_bit():
+    energy_j = 6.62607015e-34 * 299792458.0 / 1.55e-6
+    wanted = (0.625 * 2.5e-12 / energy_j + 1250.0) / 622.08e6
+    assert counted()._counts(622.08e6, 1.55e-6) == pytest.approx(wanted, rel=1e-12)
+    assert counted(dark_count_rate_1_s=None)._counts(622.08e6, 1.55e-6) < wanted
+    for without in (counted(background_power_w=None)._counts(1e9, 1e-6), counted()._counts(0.0, 1e-6)):
+        assert without is None
+    assert counted()._counts(math.nan, 1e-6) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "gain"),
+    [
+        ({"extinction_ratio_db": 20.0}, 13.60899),
+        ({"extinction_ratio_db": 6.25}, 15.93785),
+        ({"detector": "apd", "avalanche_gain": 12.5, "ionisation_ratio": 0.375, "extinction_ratio_db": 9.5}, 86.94516),
+        ({"detector": "pin", "extinction_ratio_db": 9.5}, 17.78987),
+        ({"modulation": "dpsk", "detector": "preamplified"}, 15.22188),
+        ({"detector": "preamplified"}, 10.26689),
+        ({"modulation": "qpsk", "detector": "homodyne"}, 12.88197),
+        ({"modulation": "ppm", "order": 32}, 11.0323),
+        ({"modulation": "ppm", "order": 32, "code_rate": None}, 1.204021),
+    ],
+)
+def test_the_most_that_a_code_can_gain_is_that_of_its_receiver(changes, gain):
+    assert counted(**changes).most_code_gain(622.08e6, 1.55e-6) == pytest.approx(gain, rel=1e-5)
+
+
+def test_rate_and_gain_of_a_code_are_its_own_by_name_and_those_given_else():
+    given, none = counted(), counted(code_rate=None, code_gain_db=None)
+    assert (given.rate_of_code, given.net_gain_db, given.named_code) == (0.4375, 3.25, None)
+    assert (none.rate_of_code, none.net_gain_db) == (1.0, 0.0)
+    named = counted(code="dvb-s2-3-4", bit_error_ratio=1e-7)
+    assert named.rate_of_code == named.named_code.rate == pytest.approx(0.743737, rel=1e-6)
+    assert named.net_gain_db == named.named_code.net_gain_db(1e-7)
+    assert counted(code="scppm-1-2").net_gain_db == 0.0 and counted(code="none").named_code is None
+
+
+@pytest.mark.parametrize(
+    ("modulation", "ratio", "error", "reaches"),
+    [
+        ("bpsk", 3e-4, 0.434, True),
+        ("bpsk", 3e-4, 0.436, False),
+        ("qpsk", 3e-4, 0.434, False),
+        ("qpsk", 2e-5, 0.19, True),
+        ("qpsk", 2e-5, 0.193, False),
+        ("dpsk", 3e-4, 1.0, True),
+        ("bpsk", 1e-18, None, True),
+    ],
+)
+def test_a_phase_error_leaves_its_ratio_in_reach_or_not(modulation, ratio, error, reaches):
+    assert counted(modulation=modulation, bit_error_ratio=ratio, phase_error_rad=error).reaches_ratio is reaches
