@@ -12,9 +12,10 @@ import pytest
 
 from made_tables import one_line
 from microrad.campaign.definition import checks, distributions, draws, keys, values
+from microrad.campaign.definition import records as definition_records
 from microrad.campaign.definition.distributions import LogUniform, Normal, OneOf, Uniform, uncovered
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
-from microrad.campaign.definition.records import Draw
+from microrad.campaign.definition.records import Cell, Draw, Variable
 from microrad.campaign.definition.values import NotedError
 from microrad.campaign.records import Limit
 from microrad.mirror import Variant
@@ -1230,3 +1231,116 @@ KEYS = {
 def test_a_key_is_found_with_its_table_and_unit_or_refused_in_full(what):
     call, words = KEYS[what]
     assert one_line(str(call())) == one_line(words)
+
+
+@pytest.mark.parametrize(
+    ("key", "distribution", "files"),
+    [
+        ("fine_pointing.vibration.file", OneOf((1.0, 2.0), (0.5, 0.5), ("a.csv", "b.csv"), True), ("a.csv", "b.csv")),
+        ("fine_pointing.mirror_file", OneOf((1.0,), (1.0,), ("m.toml",), True), ("m.toml",)),
+        ("communication.fading.series", OneOf((1.0,), (1.0,), ("f.csv",), True), ("f.csv",)),
+        ("conventions.strehl", OneOf((1.0,), (1.0,), ("ratio",), True), ()),
+        ("fine_pointing.profile", OneOf((1.0,), (1.0,), ("x",), True), ()),
+        ("communication.fading.series", None, ()),
+        ("communication.fading.series", Normal(1.0, 0.5), ()),
+    ],
+)
+def test_the_files_of_an_input_are_those_that_its_list_names(key, distribution, files):
+    assert Draw(key, "", distribution, None).files == files
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "is_log", "quarter"),
+    [
+        (2.0, 20.0, True, 2.0 * 10.0**0.25),
+        (2.0, 19.99, False, 2.0 + 17.99 / 4.0),
+        (-20.0, -2.0, False, -15.5),
+        (0.0, 8.0, False, 2.0),
+    ],
+)
+def test_a_variable_goes_evenly_or_by_ratios_and_never_beyond_its_bounds(low, high, is_log, quarter):
+    variable = Variable("a", "m", low, high)
+    assert (variable.log, variable.at(0.25)) == (is_log, pytest.approx(quarter, rel=1e-12))
+    assert (variable.at(0.0), variable.at(1.0), variable.at(1.0 + 1e-9), variable.at(-0.1)) == (low, high, high, low)
+
+
+def test_a_cell_has_its_values_in_words_and_a_column_for_each_direction(monkeypatch):
+    file = SimpleNamespace(mission=SimpleNamespace(mirror="no whole mission"))
+    cell = Cell({"a.b": "5 cm", "mirror": "m.toml"}, {}, file)
+    assert (cell.label, cell.directions, cell.mirror) == ("a.b = 5 cm, mirror = m.toml", (), None)
+    assert Cell({}, {}, file).label == ""
+    monkeypatch.setattr(definition_records.coupled, "directions", lambda mirror: 3)
+    several = Cell({}, {}, file, several_axes=object())
+    assert several.directions == ("mirror.1", "mirror.2", "mirror.3")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (True, "true"),
+        (False, "false"),
+        ("5 cm", "5 cm"),
+        (622.08, "622.08"),
+        (7, "7"),
+        (["1 Hz", ["a", True], 2.5], "[1 Hz, [a, true], 2.5]"),
+        ([], "[]"),
+    ],
+)
+def test_a_value_of_a_campaign_is_told_as_its_file_has_it_without_quotes(value, text):
+    assert values.text_of(value) == text
+
+
+@pytest.mark.parametrize(
+    ("output", "expected"),
+    [
+        ("radius", 'an angle with its unit, above 0 rad; for example half_width = "0.05 urad"'),
+        ("data_rate", 'a data rate with its unit, above 0 bit/s; for example half_width = "0.05 Mbit/s"'),
+        ("volume", 'a volume of data with its unit, above 0 bit; for example half_width = "0.05 GB"'),
+        ("outage", "a number without quotes, above 0; for example half_width = 0.001"),
+        ("none", "as it was"),
+        (3, "as it was"),
+    ],
+)
+def test_a_half_width_that_is_missing_is_told_in_the_unit_of_its_output(output, expected):
+    document = Document(Path("c.toml"), "campaign file", "")
+    reader = values.ValueReader(document)
+    reader.fault("precision.half_width", None, "is missing", "as it was")
+    reader.fault("precision.half_width", None, "is wrong", "as it was")
+    reader.fault("precision.quantile", None, "is missing", "as it was")
+    checks.tell_half_width(reader, output)
+    assert [fault.expected for fault in document.faults] == [expected, "as it was", "as it was"]
+
+
+def test_of_several_numbers_each_that_is_wrong_is_noted_by_its_own_name():
+    document = Document(Path("c.toml"), "campaign file", "")
+    rule = Quantity("m", "cm", above=0.0)
+    with pytest.raises(NotedError):
+        values.ValueReader(document).numbers("a.b", {"low": (rule, "-5 cm"), "mid": (rule, "1 m"), "high": (rule, 7)})
+    assert [(f.key, f.value, f.reason, f.expected) for f in document.faults] == [
+        ("a.b.low", '"-5 cm"', "is not above 0 m", 'a length with its unit, above 0 m; for example low = "5 cm"'),
+        ("a.b.high", "7", "is a number without a unit", 'a length with its unit; for example high = "7 cm"'),
+    ]
+    found = values.ValueReader(document).numbers("a.b", {"low": (rule, "5 cm"), "high": (rule, "1.25 m")})
+    assert found == (0.05, 1.25)
+
+
+def test_the_second_mission_of_a_grid_is_checked_for_its_loop_in_full(mission):
+    told = []
+    for table, fine in (
+        ({"controller": "LQR"}, {}),
+        ({"axes": "one"}, {"mirror_file": "a.toml"}),
+        ({"mirror": Variant.COMPARISON}, {"mirror_file": "a.toml"}),
+        ({"mirror": Variant.COMPARISON}, {"comparison": None}),
+        ({"duration_s": 0.25, "settle_s": 0.375}, {}),
+        ({}, {"duration_s": 0.0625}),
+    ):
+        told.append(noted(checks.check_loop, loop(**table), [mission(**fine)]))
+    of_axes = "is for a mirror on each axis, and fine_pointing.mirror_file names one of several axes"
+    assert told == [
+        'loop.controller = "LQR" is no controller of the fine-pointing study: "PI" or "LQG" ("LQG")',
+        f'loop.axes = "one" {of_axes}: axes = "both" ()',
+        f'loop.mirror = "comparison" {of_axes}: mirror = "given" ()',
+        'loop.mirror = "comparison" needs a comparison model, which the mirror "A" has not: mirror = "given" ()',
+        'loop.duration =  leaves 250 ms, all of it settling (375 ms): duration = "1.5 s" would do ()',
+        'loop.duration =  leaves 62.5 ms, all of it settling (500 ms): duration = "2 s" would do ()',
+    ]

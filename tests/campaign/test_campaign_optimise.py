@@ -15,6 +15,7 @@ from scipy.stats import beta, norm
 import budgets
 from campaign_files import HEAD, LOOP, POWER, loaded
 from microrad import link
+from microrad.campaign.optimisation import campaign as optimisation_campaign
 from microrad.campaign.optimisation import search
 from microrad.campaign.optimisation.campaign import _CandidateRows
 from microrad.campaign.optimisation.candidates import Candidate, Kept, Problem, Variable, judged
@@ -1241,3 +1242,46 @@ def test_fresh_rows_that_cannot_be_drawn_are_warned_of():
     assert asked == [[0.25, 0.75]]
     assert search._on_fresh_rows(problem(), Candidate({}, 0.5, (kept(-1.0),)), never) == (None, ())
     assert search._on_fresh_rows(problem(), None, never) == (None, ())
+
+
+def test_the_tables_of_a_file_of_links_alone_are_optimised_over_rows_of_their_own(monkeypatch):
+    """Fresh rows come behind those of the search; the first cell counts, with values by their keys."""
+    seen = []
+
+    class Rows:
+        def __init__(self, campaign, controllers, values, memory):
+            seen.append((controllers, values, memory))
+
+        def rows(self, cell, rows, beat):
+            seen.append((cell, rows))
+            each = np.arange(rows.start, rows.stop, dtype=float)
+            return SimpleNamespace(columns={"weight": each + 0.5, "margin": -each, "other": each})
+
+    monkeypatch.setattr(optimisation_campaign, "Evaluator", Rows)
+    monkeypatch.setattr(optimisation_campaign, "ControllerTuner", lambda campaign: None)
+    monkeypatch.setattr(optimisation_campaign, "touches_loop", lambda key, m: key == "b")
+    campaign = SimpleNamespace(
+        variables=(Variable("a", "m", 0.0, 1.0), Variable("c", "", 0.0, 1.0)),
+        mission=SimpleNamespace(mission=None),
+        table=SimpleNamespace(loop=None),
+        outputs=[SimpleNamespace(name="margin")],
+    )
+    made = _CandidateRows(campaign, 20, 1)
+    found = made.columns(np.array([0.25, 0.75]), first=20)
+    assert list(found) == ["weight", "margin"]
+    assert found["weight"].tolist() == [k + 0.5 for k in range(20, 40)] and found["margin"].tolist()[0] == -20.0
+    assert seen[0] == ({}, {"a": 0.25, "c": 0.75}, {})
+    assert [cell for cell, _ in seen[1:]] == [0] * 8
+    assert [k for _, rows in seen[1:] for k in rows] == list(range(20, 40))
+    campaign.variables = (Variable("b", "m", 0.0, 1.0),)
+    assert _CandidateRows(campaign, 3, 1).memory is None
+    few = _CandidateRows(campaign, 3, 1).columns(np.array([0.5]))
+    assert few["margin"].tolist() == [0.0, -1.0, -2.0]
+
+
+def test_a_file_without_an_optimisation_is_refused_by_its_name(monkeypatch):
+    campaign = SimpleNamespace(table=SimpleNamespace(optimise=None, seed=3))
+    monkeypatch.setattr(optimisation_campaign, "load_campaign", lambda file: campaign)
+    with pytest.raises(CampaignError) as error:
+        optimisation_campaign.optimise_campaign("a b.toml")
+    assert str(error.value) == "a b.toml: there is no table [optimise] in it, so nothing says what to optimise"
