@@ -118,10 +118,7 @@ def test_one_value_left_unknown_is_still_refused(tmp_path, name):
 
 @pytest.mark.promise("link-54")
 def test_a_crosslink_begins_with_less_than_25_lines(tmp_path):
-    """
-
-
-    Whole, with its comments: it is the file that one changes into one's own link."""
+    """Whole, with its comments: it is the file that one changes into one's own link."""
     text = preset_text("crosslink")
     assert len(text.splitlines()) == 24
     path = tmp_path / "crosslink.toml"
