@@ -1090,6 +1090,8 @@ def plans(**changes):
         ),
         ({"precision": SimpleNamespace(at_most=1100), "rows": 300}, Plan(256, 256, (512, 768, 1024), True)),
         ({"precision": SimpleNamespace(at_most=600), "rows": 300, "chunk_rows": 2}, Plan(2, 256, (512,), True)),
+        ({"precision": SimpleNamespace(at_most=511), "rows": 300}, Plan(256, 256, (300,), True)),
+        ({"precision": SimpleNamespace(at_most=300), "rows": 300}, Plan(256, 256, (300,), True)),
     ],
 )
 def test_a_plan_has_the_chunks_and_rounds_of_its_rows(changes, plan):

@@ -457,7 +457,7 @@ def test_sensitivities_are_of_limited_outputs_over_equal_rows_of_drawn_inputs(mo
         ((), [3, 2, 1, 4]),
         ((Limit("margin", 1.0, None, ""),), [3, 2, 1, 4]),
         ((Limit("residual", None, 1.0, ""), Limit("margin", 1.0, None, "")), [1, 2, 3, 4]),
-        ((Limit("margin", 1.0, 2.0, ""),), [1, 2, 3, 4]),
+        ((Limit("margin", 1.0, 2.0, ""),), [3, 2, 1, 4]),
         ((Limit("margin", 1.0, None, ""), Limit("residual", None, 1.0, "")), [3, 2, 1, 4]),
     ],
 )

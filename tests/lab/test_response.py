@@ -451,8 +451,9 @@ def test_lines_are_excited_from_a_thousandth_of_the_strongest_drive_on():
     drive[:, 0, 6, 1] = np.sqrt(0.049)
     drive[:, 0, 4] = np.sqrt(0.03)
     drive[:, 0, [0, 8]] = 99.0
-    assert response._excited_lines(drive).tolist() == [3, 5]
-    assert told(response._excited_lines, 0 * drive) == (
+    assert response._excited_lines(drive, 16).tolist() == [3, 5]
+    assert response._excited_lines(drive, 17).tolist() == [3, 8]
+    assert told(response._excited_lines, 0 * drive, 16) == (
         "no drive changes in any record, so there is no response; excite the mirror."
     )
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+import tomllib
 from types import SimpleNamespace
 
 import numpy as np
@@ -854,3 +855,9 @@ def test_a_coupling_is_singular_beyond_a_condition_of_ten_thousand(coupling, cos
     matrix = np.diag([1.0, cosine]) @ np.array(coupling).reshape(2, 2)
     assert bool(np.linalg.cond(matrix) > 1e4) is singular
     assert fine_pointing_table._singular(coupling, cosine) is singular
+
+
+def test_a_coupling_that_is_missing_is_shown_as_four_numbers_that_are_taken():
+    (annotation,) = fine_pointing_table.Coupling.__metadata__
+    assert annotation.example == "[1.0, 0.0, 0.0, 1.0]"
+    assert annotation.read(tomllib.loads(f"a = {annotation.example}")["a"]) == (1.0, 0.0, 0.0, 1.0)

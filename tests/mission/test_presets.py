@@ -294,6 +294,7 @@ def test_an_example_without_its_unit_is_the_number_where_that_is_allowed(value, 
         Quantity("W", above=0.0, most=20.0).read(value)
 
 
+@pytest.mark.parametrize(
     ("name", "hint"),
     [
         ("oicets", "did you mean oicets-artemis?"),

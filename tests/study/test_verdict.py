@@ -368,8 +368,6 @@ def test_the_points_where_claims_hold_together_are_told_by_composition_and_gains
     assert verdict._together_claim(none).why == f"Nowhere together with these: {names[0]}; {names[1]}"
 
 
-
-
 def in_words(*claims):
     """Claims with all that they say, one behind the other."""
     return " || ".join(" | ".join((c.where, c.claim, c.ours, c.agrees, c.why)) for c in claims)
