@@ -1,12 +1,14 @@
 """The command that verifies this installation: what it writes and prints, its exit code, what it refuses."""
 
 import json
+import math
+from types import SimpleNamespace
 
 import pytest
 
 from command_line import listing
 from microrad.core.integrity import Integrity
-from microrad.report.verification import check, findings
+from microrad.report.verification import check, findings, page
 from microrad.report.verification.evidence import Comparison, Referent
 
 WHOLE = Integrity("commit 0")
@@ -106,3 +108,30 @@ def test_a_folder_that_is_a_file_is_refused_before_anything_runs(call, tmp_path,
     assert result.code == 2
     assert "taken" in result.err
     assert len(result.err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "full", "place", "ok"),
+    [
+        ((), False, "", True),
+        (("--full",), True, "", False),
+        (("--output", "a b/deep"), False, "a b/deep/", False),
+        (("--output", "x", "--full"), True, "x/", True),
+    ],
+)
+def test_what_is_written_is_listed_behind_the_text_in_its_order(call, folder, monkeypatch, words, full, place, ok):
+    asked, found = [], SimpleNamespace(ok=ok)
+    monkeypatch.setenv("COLUMNS", "97")
+    monkeypatch.setattr(findings, "verify", lambda **more: asked.append(more) or found)
+    for name, said in (("data", {"n": math.nan}), ("page", "<!page>"), ("text", None)):
+        made = (lambda found, width: f"told in {width}") if said is None else (lambda found, said=said: said)
+        monkeypatch.setattr(page, f"verification_{name}", made)
+    monkeypatch.setattr(page, "domains_text", lambda found: "domains")
+    files = {"verification.html": b"<!page>", "verification.json": b'{\n  "n": null\n}\n', "domains.json": b"domains"}
+    names = [*files][: 3 if full else 2]
+    shown = call("verify", *words)
+    assert (shown.code, asked[0]["full"], callable(asked[0]["on_progress"])) == (int(not ok), full, True)
+    assert shown.out == "told in 97\n\n" + "".join(f"{place}{name}\n" for name in names) + "\n"
+    written = {name: content for name, content in listing(folder).items() if content}
+    assert written == {f"{place}{name}": files[name] for name in names}
+    assert call("verify", *words, "--json").out == '{\n  "n": null\n}\n'
