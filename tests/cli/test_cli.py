@@ -1761,3 +1761,229 @@ def test_a_preset_says_what_is_to_be_given_first(call, folder, monkeypatch, whol
     assert said == (
         "microrad: mine.toml exists and is left as it is; name another one: microrad init --preset mine other.toml.\n"
     )
+
+
+# -------------------------------------------------------------------------------------------- handed on, one by one
+@pytest.mark.parametrize(
+    ("given", "mirror", "to", "flags", "code"),
+    [
+        ((), None, "my day-study", (False, False), 1),
+        (("--mirror", "m.toml", "--overwrite", "--exit-on", "closes"), "m.toml", "my day-study", (True, False), 0),
+        (("--output", "a/b", "--verbose", "--fresh"), None, "a/b", (False, True), 1),
+    ],
+)
+def test_a_study_is_run_and_written_as_it_is_asked_for(call, folder, monkeypatch, given, mirror, to, flags, code):
+    from microrad.core import kept
+
+    overwrite, verbose = flags
+    done, trouble = [], SimpleNamespace(trouble="no room for it")
+    parts = kept.NOTHING if "--fresh" in given else trouble
+    judged = SimpleNamespace(met=False, closes=True)
+    monkeypatch.setenv("COLUMNS", "101")
+    monkeypatch.setattr(kept, "of_user", lambda: trouble)
+    monkeypatch.setattr(
+        "microrad.mission.file.load_mission", lambda *given: done.append(given) or SimpleNamespace(path="there.toml")
+    )
+    monkeypatch.setattr(report, "check_folder", lambda *given: done.append(given))
+    monkeypatch.setattr(
+        study, "run_study", lambda mission, progress, parts: done.append((mission.path, parts)) or judged
+    )
+    monkeypatch.setattr(report, "verdict_text", lambda study, width, verbose: f"{study.met} {width} {verbose}")
+    monkeypatch.setattr(report, "summary", lambda study: {"met": study.met, "folder": "?"})
+    monkeypatch.setattr(
+        report,
+        "write",
+        lambda study, folder, overwrite, on_progress, parts: done.append(
+            (folder, overwrite, callable(on_progress), parts)
+        ),
+    )
+    shown = call("run", "some/my day.toml", *given)
+    steps = [(Path("some/my day.toml"), mirror and Path(mirror)), (Path(to), overwrite), ("there.toml", parts)]
+    steps.append((Path(to), overwrite, True, parts))
+    written = [f"{to}/{name}" for name in ("report.html", "results.nc", "manifest.json")]
+    said = "" if "--fresh" in given else "microrad: no room for it\n"
+    assert (shown.code, shown.err, done) == (code, said, steps)
+    assert shown.out.splitlines() == [f"False 101 {verbose}", "", *written]
+    shown = call("run", "some/my day.toml", *given, "--json")
+    assert (shown.code, json.loads(shown.out), done[4:]) == (code, {"met": False, "folder": to}, steps)
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_a_report_that_differs_is_exit_1(call, monkeypatch, same):
+    asked, found = [], SimpleNamespace(same=same)
+    where = "microrad.report.results.reproduce"
+    monkeypatch.setattr(f"{where}.reproduce", lambda path, progress: asked.append((path, callable(progress))) or found)
+    monkeypatch.setattr(f"{where}.reproduction_text", lambda found: f"in words: {found.same}")
+    monkeypatch.setattr(f"{where}.reproduction_data", lambda found: {"same": found.same})
+    assert call("reproduce", "a/report.html") == (int(not same), f"in words: {same}\n", "")
+    shown = call("reproduce", "b", "--json")
+    assert (shown.code, json.loads(shown.out)) == (int(not same), {"same": same})
+    assert asked == [(Path("a/report.html"), True), (Path("b"), True)]
+
+
+@pytest.mark.parametrize("good", [(True, True), (True, False), (False, True)])
+def test_an_installation_with_a_problem_is_exit_1(call, monkeypatch, good):
+    checks = [installation.Check(name, ok, f"{name} found", "do") for name, ok in zip("ab", good, strict=True)]
+    monkeypatch.setenv("COLUMNS", "90")
+    monkeypatch.setattr(installation, "run", lambda: checks)
+    monkeypatch.setattr(installation, "text", lambda found, width: f"{len(found)} at {width}")
+    assert call("doctor") == (int(not all(good)), "2 at 90\n", "")
+    data = call("doctor", "--json")
+    each = [{"name": c.name, "ok": c.ok, "found": c.found, "advice": "do"} for c in checks]
+    assert (data.code, json.loads(data.out)) == (int(not all(good)), {"ok": all(good), "checks": each})
+
+
+def test_an_explanation_is_as_wide_as_the_terminal_and_an_unknown_key_is_refused(call, refused, monkeypatch):
+    from microrad.mission.explain import explained, text
+
+    key, width = "fine_pointing", 131
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert call("explain", key).out == f"{text(explained(key), width)}\n\n"
+    with pytest.raises(ValueError, match="no-such") as refusal:
+        explained("no-such")
+    assert refused("explain", "no-such") == f"microrad: {refusal.value}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("50 kHz", "Hz", 5e4),
+        ("37.5 mm", "m", 0.0375),
+        ("-7 urad", "rad", -7e-6),
+        ("3 Hz", "V", None),
+        ("5", "Hz", None),
+    ],
+)
+def test_a_quantity_of_an_option_is_that_of_its_unit_or_refused_in_the_words_of_units(text, unit, value):
+    from microrad.core.units import UnitError, parse_quantity
+
+    if value is not None:
+        assert frame.quantity_of(unit)(text) == pytest.approx(value, rel=1e-12)
+        return
+    with pytest.raises(UnitError) as said:
+        parse_quantity(text, unit)
+    with pytest.raises(typer.BadParameter) as refusal:
+        frame.quantity_of(unit)(text)
+    assert str(refusal.value) == str(said.value)
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "said", "closed"),
+    [
+        (None, 7, "", 0),
+        (BrokenPipeError(), frame.UNREAD, "", 1),
+        (OSError(28, "No room"), frame.REFUSED, "microrad: the output cannot be written: No room\n", 1),
+        (KeyboardInterrupt(), frame.INTERRUPTED, "microrad: interrupted while printing\n", 1),
+    ],
+)
+def test_an_output_that_cannot_be_printed_is_told_by_its_reason(monkeypatch, capsys, raised, code, said, closed):
+    count = []
+
+    class Out:
+        encoding = "utf-8"
+
+        def write(self, text):
+            if raised is not None:
+                raise raised
+
+        def flush(self):
+            pass
+
+    monkeypatch.setattr(frame, "_close_stdout", lambda: count.append(1))
+    monkeypatch.setattr(sys, "stdout", Out())
+    found = frame._printed("text", 7)
+    assert (found, capsys.readouterr().err, len(count)) == (code, said, closed)
+
+
+def test_a_process_that_is_left_has_said_what_it_had_to_say(monkeypatch):
+    done = []
+
+    def stream(name, error=None):
+        def flush():
+            done.append(name)
+            if error:
+                raise error
+
+        return SimpleNamespace(flush=flush)
+
+    monkeypatch.setattr(frame, "os", SimpleNamespace(_exit=done.append))
+    for error in (None, ValueError("closed"), OSError(28, "full")):
+        monkeypatch.setattr(frame, "sys", SimpleNamespace(stdout=stream("out", error), stderr=stream("err", error)))
+        frame._leave(130)
+    assert done == ["out", "err", 130] * 3
+
+
+@pytest.mark.parametrize(("ended", "left"), [(130, True), (0, False), (1, False), (None, False)])
+@pytest.mark.parametrize("ignored", [(), (signal.SIGHUP,), (signal.SIGHUP, signal.SIGTERM)])
+def test_the_command_line_takes_what_ends_it_as_an_interrupt_unless_that_is_ignored(
+    monkeypatch, capsys, ignored, ended, left
+):
+    done, first = [], []
+
+    def run(prog_name):
+        raise SystemExit(ended)
+
+    taken = SimpleNamespace(
+        SIGTERM=signal.SIGTERM,
+        SIGHUP=signal.SIGHUP,
+        SIG_IGN="ignored",
+        default_int_handler="interrupt",
+        getsignal=lambda number: "ignored" if number in ignored else "default",
+        signal=lambda number, handler: done.append((number, handler)),
+    )
+    monkeypatch.setattr(frame, "signal", taken)
+    monkeypatch.setattr(frame, "gc", SimpleNamespace(set_threshold=lambda *given: None))
+    monkeypatch.setattr(frame, "compiling", SimpleNamespace(on_first=first.append))
+    monkeypatch.setattr(frame, "app", run)
+    monkeypatch.setattr(frame, "_leave", done.append)
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    with pytest.raises(SystemExit) as stop:
+        frame.main()
+    numbers = [number for number in (signal.SIGTERM, signal.SIGHUP) if number not in ignored]
+    assert done == [*((number, "interrupt") for number in numbers), *[130] * left]
+    assert (stop.value.code, sys.unraisablehook, os.environ["OPENBLAS_NUM_THREADS"]) == (
+        ended,
+        frame.interrupt_again,
+        "1",
+    )
+    first[0]()
+    words = "compiling the loops for this processor: once, for about half a minute"
+    assert capsys.readouterr().err == f"microrad: {words}\n"
+
+
+def test_what_is_refused_afterwards_is_said_behind_what_was_printed(capsys):
+    def refuse():
+        raise frame.Refusal("no room for the report")
+
+    @frame.command
+    def body(text, *, code):
+        return frame.Outcome(text, code, afterwards=refuse)
+
+    with pytest.raises(typer.Exit) as stop:
+        body("verdict", code=0)
+    shown = capsys.readouterr()
+    assert (stop.value.exit_code, shown.out, shown.err) == (2, "verdict\n", "microrad: no room for the report\n")
+
+
+def test_progress_is_said_where_it_can_be_seen(monkeypatch, tmp_path):
+    monkeypatch.delenv(frame.PROGRESS_FILE, raising=False)
+    monkeypatch.setattr(frame, "_progress_lines", lambda every_s: ("lines", every_s))
+    monkeypatch.setattr(frame, "_progress_records", lambda file: ("records", file.write(b"new")))
+    monkeypatch.setattr(sys, "stderr", SimpleNamespace(isatty=lambda: False))
+    for given, every_s in (((), math.inf), ((12.5,), 12.5)):
+        with frame.progress_bar(*given) as progress:
+            assert progress == ("lines", every_s)
+    (tmp_path / "progress").write_bytes(b"old ")
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(tmp_path / "progress"))
+    with frame.progress_bar() as progress:
+        assert progress == ("records", 3)
+    assert (tmp_path / "progress").read_bytes() == b"old new"
+
+
+def test_examples_stand_set_in_below_their_heading():
+    assert frame.examples("microrad a", "microrad b  two") == "\b\nExamples:\n  microrad a\n  microrad b  two"
+    made = frame.group("g", "what it does", "the end", add_completion=False).info
+    assert (made.name, made.help, made.epilog, made.no_args_is_help) == ("g", "what it does", "the end", True)
+    found = frame.option("--flag", "WORD", "its help", min=3)
+    assert (found.default, found.metavar, found.help, found.min) == ("--flag", "WORD", "its help", 3)
