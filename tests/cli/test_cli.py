@@ -1987,3 +1987,133 @@ def test_examples_stand_set_in_below_their_heading():
     assert (made.name, made.help, made.epilog, made.no_args_is_help) == ("g", "what it does", "the end", True)
     found = frame.option("--flag", "WORD", "its help", min=3)
     assert (found.default, found.metavar, found.help, found.min) == ("--flag", "WORD", "its help", 3)
+
+
+@pytest.mark.parametrize(
+    ("options", "hold", "written", "live"),
+    [
+        ((), "zero-order", "prandtl_ishlinskii", None),
+        (("--model", "bouc-wen", "--admissible", "--json"), "zero-order", "bouc_wen_admissible", None),
+        (("--measured-drive", "--name", "mine", "--overwrite"), "first-order", "prandtl_ishlinskii", "progress"),
+    ],
+)
+def test_a_mirror_that_was_found_is_written_with_all_that_was_said_of_it(
+    call, folder, monkeypatch, options, hold, written, live
+):
+    asked, recording = {}, write_recording(folder / "loop.csv")
+    found = SimpleNamespace(chosen="prandtl_ishlinskii", unsupported="")
+    if live:
+        monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / live))
+    monkeypatch.setenv("COLUMNS", "99")
+    monkeypatch.setattr("microrad.lab.live_fit.live_fit_writer", lambda path: f"fits beside {path}")
+    monkeypatch.setattr(identify, "identify", lambda *given, **more: asked.update(fit=more) or found)
+    monkeypatch.setattr(identify, "mirror_file_text", lambda found, title, model: f"# {title} {model}")
+    monkeypatch.setattr(
+        report,
+        "identification_text",
+        lambda found, model, width, mirror_file, report_file: f"{model} {width} {mirror_file} {report_file}",
+    )
+    monkeypatch.setattr(report, "identification_data", lambda found, model, **files: {"model": model} | said(files))
+    monkeypatch.setattr(report, "write_identification", lambda *given, **more: asked.update(page=(given, more)))
+
+    def said(files):
+        return {name: str(path) for name, path in files.items()}
+
+    shown = call("identify", recording, *COLUMNS, "--mirror-file", "m.v2.toml", *options)
+    title = "mine" if "--name" in options else "loop"
+    files = {"mirror_file": "m.v2.toml", "report_file": "m.v2.html"}
+    if "--json" in options:
+        assert json.loads(shown.out) == {"model": written, **files}
+    else:
+        units = (
+            "drive in V (assumed, --input-unit says otherwise), output in mrad (assumed, --output-unit says otherwise)"
+        )
+        assert shown.out == f"{units}\n\n{written} 99 m.v2.toml m.v2.html\n"
+    assert (shown.code, shown.err) == (0, "")
+    fit = asked["fit"]
+    assert (fit["on_fit"], fit["side_by_side"]) == (f"fits beside {folder / live if live else None}", not live)
+    assert (fit["hold"], fit["admissible"]) == (hold, "--admissible" in options)
+    (about, place), more = asked["page"]
+    (read,) = more.pop("recordings")
+    assert (about, place, read.samples, read.rate_hz) == (found, Path("m.v2.html"), 1500, 1000.0)
+    text = f"# {title} {written}"
+    assert more == {
+        "mirror_file": Path("m.v2.toml"),
+        "mirror_text": text,
+        "title": title,
+        "written": written,
+        "overwrite": "--overwrite" in options,
+        "virtual": False,
+    }
+    assert (folder / "m.v2.toml").read_text("utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("model", "fitted"),
+    [
+        ("bouc-wen-joint", ("a", "bouc_wen_joint")),
+        ("bouc-wen", ("a", "bouc_wen")),
+        ("best", ("a",)),
+        ("linear", ("a", "linear")),
+    ],
+)
+def test_a_model_is_fitted_once(model, fitted):
+    assert lab._wanted(("a",), lab.Model(model)) == fitted
+    assert lab._wanted(fitted, lab.Model(model)) == fitted
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"positions_m": ((0.0, 1.0),)}, "positions and signs are for several outputs or drives: leave out --position"),
+        ({"signs": ((1.0,), (-1.0,))}, "positions and signs are for several outputs or drives: leave out --position"),
+        ({"unsupported": "nothing holds"}, "nothing holds"),
+    ],
+)
+def test_what_cannot_be_identified_of_one_axis_writes_nothing(refused, folder, monkeypatch, changes, words):
+    recording = write_recording(folder / "loop.csv")
+    read, unsupported = recordings.given_recordings, changes.pop("unsupported", "")
+    monkeypatch.setattr(lab, "given_recordings", lambda options: replace(read(options), **changes))
+    found = SimpleNamespace(unsupported=unsupported)
+    monkeypatch.setattr(identify, "identify", lambda *given, **more: found if unsupported else pytest.fail("it ran"))
+    assert refused("identify", recording, *COLUMNS).startswith(f"microrad: {words}")
+
+
+@pytest.mark.parametrize(
+    ("option", "flag"),
+    [
+        (("--measured-drive",), "--measured-drive"),
+        (("--static",), "--static"),
+        (("--model", "linear"), "--model"),
+        (("--admissible",), "--admissible"),
+        (("--seed", "3"), "--seed"),
+        (("--hold-out", "0"), "--hold-out"),
+        (("--lever-arm", "5 mm"), "--lever-arm"),
+        (("--seed", "1", "--static"), "--static"),
+    ],
+)
+def test_each_option_of_one_axis_is_refused_beside_several(refused, folder, monkeypatch, option, flag):
+    given = SimpleNamespace(channels=(2, 3), name=None, several_channels=True, every=(), lever_arm_m=None)
+    given.lever_arm_m = 0.005 if flag == "--lever-arm" else None
+    monkeypatch.setattr(lab, "given_recordings", lambda options: given)
+    monkeypatch.setattr(lab, "identify_channels", lambda *given: pytest.fail("it ran"))
+    assert refused("identify", "a.csv", *option) == (
+        f"microrad: {flag} is for one drive and one output, and these recordings have 2 and 3: leave it out, or name "
+        "one of each (--input, --output).\n"
+    )
+
+
+def test_recordings_of_several_channels_are_identified_with_their_units_and_files(call, folder, monkeypatch):
+    asked = []
+    given = SimpleNamespace(channels=(2, 3), name="of the list", several_channels=True, every=(), lever_arm_m=None)
+    monkeypatch.setattr(lab, "given_recordings", lambda options: given)
+    monkeypatch.setattr(lab, "identify_channels", lambda *given: asked.append(given) or frame.Outcome("found", 130))
+    options = ("--input-unit", "mV", "--output-unit", "um", "--report", "r.html", "--overwrite", "--json")
+    assert call("identify", "sub/a.csv", *options) == (130, "found\n", "")
+    ((read, units, said, target, as_json),) = asked
+    assert (read, units, said, as_json) == (given, ("mV", "um"), "drive in mV (given), output in um (given)", True)
+    files = target.mirror_file, target.page, target.title, target.overwrite
+    assert files == (Path("a-mirror.toml"), Path("r.html"), "of the list", True)
+    (folder / "a-mirror.toml").write_text("mine", "utf-8")
+    with pytest.raises(frame.Refusal, match=r"a-mirror\.toml was not written by microrad .* --mirror-file\.$"):
+        target.check()

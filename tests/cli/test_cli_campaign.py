@@ -7,7 +7,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -537,3 +537,75 @@ def test_a_campaign_is_written_in_another_folder_beside_its_mission(call, folder
     shown = call("campaign", "init", "a b/tails.toml")
     assert shown.out == ("a b/tails.toml written, for a b/leo-geo.toml. Next: microrad campaign run 'a b/tails.toml'\n")
     assert sorted(listing(folder / "a b")) == ["leo-geo.toml", "tails.toml"]
+
+
+def behind(error, cause):
+    error.__cause__ = cause
+    return error
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "words"),
+    [
+        ("my rows.ledger", KeyboardInterrupt(), "stopped; finished rows are in my rows.ledger. Go on with: {go_on}"),
+        ("my rows.ledger", behind(ImportError("half"), KeyboardInterrupt()), "stopped; finished rows are in my rows"),
+        ("my rows.ledger", KeyboardInterrupt("stopped; 3 rows"), "stopped; 3 rows"),
+        ("none.ledger", KeyboardInterrupt(), ""),
+        ("sub", KeyboardInterrupt(), ""),
+        ("my rows.ledger", CampaignError("no"), "no"),
+        ("none.ledger", behind(ImportError("half"), KeyboardInterrupt("x")), "half"),
+    ],
+)
+def test_an_interrupt_says_where_finished_rows_are_unless_it_says_so_itself(folder, name, error, words):
+    (folder / "my rows.ledger").touch()
+    (folder / "sub").mkdir()
+    with pytest.raises((Exception, KeyboardInterrupt)) as raised, cli_campaign._kept(Path(name)):
+        raise error
+    words = words.format(go_on="microrad campaign resume 'my rows.ledger'")
+    assert str(raised.value).startswith(words) and bool(words) == bool(str(raised.value))
+    told = words.startswith("stopped; finished")
+    assert isinstance(raised.value, KeyboardInterrupt if told else type(error)) and (raised.value is error) is not told
+
+
+@pytest.mark.parametrize(
+    ("name", "begins", "other"),
+    [
+        ("a.csv", b"cell,", b"row,cell"),
+        ("A.CSV", b"cell,", b"Cell,"),
+        ("a.parquet", b"PAR1", b"PAR2"),
+        ("a.b.nc", b"\x89HDF", b"\x88HDF"),
+    ],
+)
+def test_rows_replace_a_file_of_their_own_kind_alone(call, refused, folder, monkeypatch, name, begins, other):
+    asked = []
+
+    @contextmanager
+    def opened(path, write):
+        yield f"book of {path}, {write}"
+
+    monkeypatch.setattr(Ledger, "open", opened)
+    monkeypatch.setattr("microrad.campaign.export.export_rows", lambda *given: asked.append(given))
+    (folder / name).write_bytes(other)
+    said = refused("campaign", "export", "x.ledger", name, "--overwrite")
+    assert said == f"microrad: {name} was not written by microrad and is left as it is; choose another name.\n"
+    (folder / name).write_bytes(begins + b"more")
+    left = f"microrad: {name} exists and is left as it is; choose another name, or replace it with --overwrite.\n"
+    assert refused("campaign", "export", "x.ledger", name) == left and not asked
+    assert call("campaign", "export", "x.ledger", name, "--overwrite") == (0, f"{name}\n", "")
+    assert asked == [("book of x.ledger, False", Path(name))]
+
+
+@pytest.mark.parametrize(
+    "both",
+    [
+        ("--threads", "2", "--workers", "2"),
+        ("--workers", "1", "--scheduler", "a:1"),
+        ("--threads", "1", "--scheduler", "a"),
+    ],
+)
+@pytest.mark.parametrize("command", [("run", "c.toml"), ("resume", "c.ledger")])
+def test_two_ways_to_work_are_refused_by_run_and_resume_before_anything(refused, monkeypatch, command, both):
+    monkeypatch.setattr("microrad.campaign.run.run_campaign", lambda *given: pytest.fail("it ran"))
+    monkeypatch.setattr("microrad.campaign.run.resume_campaign", lambda *given: pytest.fail("it ran"))
+    words = "--threads, --workers and --scheduler exclude each other; give one of them."
+    assert refused("campaign", *command, *both) == f"microrad: {words}\n"

@@ -11,6 +11,7 @@ import pytest
 
 from microrad.cli import export as cli_export
 from microrad.export import choice
+from microrad.export import matrices as linear
 from microrad.export.flight import build, write
 from microrad.export.fmi import fmu
 from microrad.export.linear_import import Given
@@ -396,3 +397,89 @@ def test_code_is_written_as_it_is_asked_for(mission, call, monkeypatch, given, f
     assert more == {"name": name, "precision": precision, "overwrite": flags[0], "accept": flags[1]}
     assert result.out == f"found in words\n\n{folder}\n"
     assert json.loads(call("export", "c", file, *given, "--json").out) == {"data": "found", "folder": folder}
+
+
+# ------------------------------------------------------------------------------------------- one option beside another
+@pytest.mark.parametrize(
+    ("given", "of", "path"),
+    [
+        ((), ("source", "axes"), "my day.mat"),
+        (("--controller", "LQG", "--accept"), ("LQG", "axes", True), "my day.mat"),
+        (("--controller", "PI", "--output", "x.mat", "--overwrite"), ("PI", "axes", False), "x.mat"),
+    ],
+)
+def test_matrices_are_of_the_mirror_or_of_a_controller_and_go_where_they_are_asked_to(
+    call, refused, folder, loaded, monkeypatch, given, of, path
+):
+    written = []
+    loaded("loop", "axes")
+    monkeypatch.setattr(choice, "source", lambda mission, several: ("source", several))
+    monkeypatch.setattr(
+        cli_export, "_promised", lambda mission, several, name, accept, progress: (name, several, accept)
+    )
+    monkeypatch.setattr(linear, "models", lambda of: [SimpleNamespace(name="mirror of"), SimpleNamespace(name=str(of))])
+    monkeypatch.setattr(linear, "write_mat", lambda found, path: written.append((found[1].name, str(path))))
+    monkeypatch.setattr(linear, "json_text", lambda found: f"[{found[1].name}]")
+    if "--overwrite" in given:
+        (folder / path).write_bytes(b"MATLAB 5.0 MAT")
+    assert call("export", "matrices", "some/my day.toml", *given) == (0, f"{path} written: mirror of, {of}\n", "")
+    (folder / path).write_bytes(b"MATLAB 4")
+    assert call("export", "matrices", "some/my day.toml", *given, "--json") == (0, f"[{of}]\n", "")
+    assert written == [(str(of), path)]
+    said = refused("export", "matrices", "some/my day.toml", *given)
+    kept = "was not written by microrad" if "--overwrite" in given else "exists"
+    replace = "" if "--overwrite" in given else ", or replace it with --overwrite"
+    assert said == f"microrad: {path} {kept} and is left as it is; choose another --output{replace}.\n"
+
+
+@pytest.mark.parametrize("begins", [b"PK\x03\x04", b"P", b"#!"])
+def test_a_unit_of_a_version_replaces_another_unit_alone(call, refused, folder, loaded, monkeypatch, begins):
+    written = []
+    loaded("loop", "axes")
+    monkeypatch.setattr(choice, "plant_unit", lambda mission, table, several: (table, several))
+    monkeypatch.setattr(fmu, "write_unit", lambda *args: written.append(args) or SimpleNamespace(words="a unit"))
+    (folder / "u.fmu").write_bytes(begins)
+    given = ("export", "fmu", "day.toml", "--fmi", "3.0", "--output", "u.fmu")
+    exists = "microrad: u.fmu exists and is left as it is; choose another --output, or replace it with --overwrite.\n"
+    assert refused(*given) == exists
+    if begins != b"PK\x03\x04":
+        assert "u.fmu was not written by microrad" in refused(*given, "--overwrite") and not written
+        return
+    assert call(*given, "--overwrite") == (0, "a unit\n", "")
+    ((unit, path, version, name),) = written
+    assert (unit, str(path), version, name) == (("fine_pointing", "axes"), "u.fmu", "3.0", "mirror")
+
+
+def test_a_controller_is_chosen_with_its_mirror_before_it_is_held_to_its_promise(monkeypatch):
+    steps = []
+    monkeypatch.setattr(cli_export, "_chosen", lambda *given: steps.append(given) or "chosen")
+    monkeypatch.setattr(choice, "promised", lambda *given: steps.append(given))
+    assert cli_export._promised("mission", "axes", "LQG", True, "progress") == "chosen"
+    assert steps == [("mission", "axes", "LQG", "progress"), ("chosen", True)]
+
+
+@pytest.mark.parametrize("several", [None, "table"])
+def test_a_mirror_of_several_axes_is_that_of_the_loop(monkeypatch, several):
+    asked = []
+    monkeypatch.setattr("microrad.mission.file.load_loop", lambda *given: asked.append(given) or ("mission", several))
+    monkeypatch.setattr("microrad.mirror.coupled.of", lambda table: f"mirror of the {table}")
+    found = cli_export._loaded("m.toml", "mirror.toml")
+    assert found == ("mission", several and "mirror of the table") and asked == [("m.toml", "mirror.toml")]
+
+
+@pytest.mark.parametrize(("name", "words"), [("2fast", "2fast"), ("a b", "a b"), ("", ""), ("int", "int")])
+@pytest.mark.parametrize("command", ["c", "fmu"])
+def test_a_name_that_no_code_can_have_is_refused_before_anything_is_designed(
+    refused, folder, loaded, monkeypatch, command, name, words
+):
+    loaded("loop")
+    monkeypatch.setattr(cli_export, "_chosen", lambda *given: pytest.fail("it was designed"))
+    assert words in refused("export", command, "day.toml", "--name", name)
+
+
+def test_an_imported_mirror_that_cannot_be_read_leaves_the_one_that_is_there(refused, folder):
+    (folder / "m-mirror.toml").write_text("# Mirror imported before", "utf-8")
+    said = refused("import", "sub/m.mat", *IMPORT)
+    where = "m-mirror.toml exists and is left as it is; choose another --output, or replace it with --overwrite."
+    assert said == f"microrad: {where}\n"
+    assert "sub/m.mat" in refused("import", "sub/m.mat", *IMPORT, "--overwrite")
