@@ -424,3 +424,90 @@ def test_the_plot_shows_the_report_s_distribution_and_what_has_a_limit_first(gro
     unlimited = found.plots[[*found.plots][1]]
     names = [each.get("name") or "" for each in (*unlimited["data"], *unlimited["layout"]["shapes"])]
     assert not any(name.startswith("limit") for name in names)
+
+
+# ------------------------------------------------------------------------------------ edges of the reader and the page
+@pytest.mark.parametrize(("took_s", "rests_s"), [(0.25, 2.0), (0.5, 2.5), (3.0, 15.0)])
+def test_a_reading_that_takes_long_is_followed_by_a_longer_rest(tmp_path, monkeypatch, took_s, rests_s):
+    now, whole = [100.0], told((9, 0), done=9)
+
+    class Slow(Read):
+        def look(self, most_s):
+            now[0] += took_s
+            assert most_s == campaign_live._READ_S
+            return super().look(most_s)
+
+    reader = Slow(whole, whole)
+    monkeypatch.setattr(interim, "Interim", reader)
+    monkeypatch.setattr(campaign_live, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    path, tabs = tmp_path / "x.ledger", LiveCampaigns()
+    path.touch()
+    tabs.look(path)
+    now[0] += rests_s - 0.01
+    assert tabs.look(path).rows == 9 and len(reader.found) == 1
+    now[0] += 0.01
+    assert tabs.look(path).rows == 9 and reader.found == []
+
+
+def test_a_ledger_that_is_removed_and_made_again_is_opened_again(tmp_path, at_once, monkeypatch):
+    first, second = told((4, 1), done=4), told((2, 0), done=2)
+    reader = Read(first, second)
+    monkeypatch.setattr(interim, "Interim", reader)
+    path, other, tabs = tmp_path / "x.ledger", tmp_path / "y.ledger", LiveCampaigns()
+    path.touch()
+    assert (tabs.look(path).failed, tabs.look(other)) == (1, Live())
+    path.unlink()
+    assert tabs.look(path) == Live()
+    path.touch()
+    assert (tabs.look(path).rows, reader.paths) == (2, [path, path])
+
+
+def test_a_made_up_ledger_is_told_with_what_was_read_of_it(tmp_path, at_once, monkeypatch):
+    rows = told((3, 0), done=3)
+    monkeypatch.setattr(interim, "Interim", Read(rows, KeyError("cell"), rows))
+    path, tabs = tmp_path / "µ x.ledger", LiveCampaigns()
+    path.touch()
+    found = [tabs.look(path) for _ in range(3)]
+    words = "µ x.ledger is no ledger that microrad wrote: its contents cannot be read (KeyError: 'cell')"
+    assert [(each.summary, each.fault) for each in found] == [(rows, ""), (rows, words), (rows, "")]
+
+
+def test_while_one_tab_reads_another_one_is_told_what_was_read_last(tmp_path, at_once):
+    tabs, path = LiveCampaigns(), tmp_path / "x.ledger"
+    tabs.look(path)
+    reader = tabs._readers[path]
+    reader.last, reader.interim = Live(told((2, 0), done=5)), None
+    path.touch()
+    with reader.busy:
+        assert tabs.look(path) is reader.last
+    assert not reader.busy.locked()
+
+
+@pytest.mark.parametrize("warnings", [(), ("odd", "rare")])
+def test_the_figures_of_a_campaign_stand_in_the_order_of_its_page(monkeypatch, warnings):
+    def drawn(name):
+        return SimpleNamespace(name=f"campaign-{name}", title=f"Of {name}", sheet=f"sheet {name}")
+
+    summary = told((3, 0), (4, 2), done=7, total=7, state="complete")
+    summary.limits = [SimpleNamespace(output=name) for name in ("c", "nowhere", "b")]
+    summary.findings, summary.warnings = ("found one", "found two"), warnings
+    parts = {"Outputs": [drawn("a"), drawn("b")], "Tail": [drawn("c"), drawn("bb")], "Empty": []}
+    titles = ("Limits", "What matters", "How the rows were made", "Outputs")
+    asked = []
+    monkeypatch.setattr(campaign_view, "campaign_figures", lambda found: parts)
+    monkeypatch.setattr(
+        campaign_view, "campaign_views", lambda found, figures: asked.append(figures) or [View(t, ()) for t in titles]
+    )
+    monkeypatch.setattr(campaign_view, "figure", lambda sheet: {"of": sheet})
+    monkeypatch.setattr(campaign_view.words, "headline", lambda found: "the headline")
+    monkeypatch.setattr(campaign_view.words, "best", lambda found: "the best")
+    monkeypatch.setattr(campaign_view.words, "answers", lambda found, best: (f"answer of {best}",))
+    found = campaign_view.figures(Live(summary))
+    assert (found.rows, found.headline) == ("Of all 7 rows", "the headline")
+    assert [*found.plots.items()] == [(f"Of {n}", {"of": f"sheet {n}"}) for n in ("b", "c", "a", "bb")]
+    assert asked == [dict.fromkeys(parts, ())]
+    said, *more = found.blocks
+    assert list(said.lines) == ["found one", "found two", "answer of the best"]
+    views = more[2:] if warnings else more
+    assert not warnings or (more[0], tuple(more[1].lines)) == ("Warnings:", warnings)
+    assert [(view.title, view.folded) for view in views] == [(t, t in titles[1:3]) for t in titles]

@@ -6,10 +6,12 @@ import platform
 import re
 import shutil
 import signal
+import sqlite3
 import stat
 import subprocess
 import sys
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -1034,3 +1036,135 @@ def test_a_command_sees_its_arguments_its_folder_and_where_its_progress_goes(tmp
     )
     assert (how["env"]["MICRORAD_PROGRESS"], how["env"]["OWN"]) == (str(tmp_path / "jobs" / "1" / "progress"), "kept")
     assert how["start_new_session"] is True
+
+
+# ------------------------------------------------------------------------------------- names and values of any kind
+@pytest.mark.parametrize("name", ["a?mode=rw", "b#c", "d%20e", "µ f", "g'h"])
+def test_a_lock_in_a_folder_of_any_name_is_seen_by_others(tmp_path, monkeypatch, name):
+    folder = tmp_path / name
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    for path in (folder / "alive", Path("alive")):
+        assert not jobs_files.is_held(path)
+        with jobs_files.held(path, 0.0) as mine, jobs_files.held(folder / "alive", 0.0) as second:
+            assert (mine, second, jobs_files.is_held(path), jobs_files.is_held(folder / "alive")) == (
+                True,
+                False,
+                True,
+                True,
+            )
+            assert [each.name for each in folder.iterdir()] == ["alive"]
+        assert not jobs_files.is_held(path) and (folder / "alive").stat().st_size == 0
+    assert [each.name for each in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("content", [b"no database " * 100, b"SQLite format 3\0" + bytes(84), b""])
+def test_what_is_no_lock_is_held_by_nobody_and_only_an_empty_file_becomes_one(tmp_path, content):
+    path = tmp_path / "alive"
+    path.write_bytes(content)
+    assert not jobs_files.is_held(path)
+    if not content:
+        with jobs_files.held(path, 0.0) as mine:
+            assert mine
+        return
+    with pytest.raises(JobError) as refusal, jobs_files.held(path, 0.0):
+        pass
+    assert str(refusal.value) == f"{path} is no lock of the studio, but a link or another program's; remove it"
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("code", "extended", "busy"), [(5, 5, True), (5, 261, True), (6, 262, False), (8, 264, False), (14, 14, False)]
+)
+def test_only_what_another_process_holds_is_busy(code, extended, busy):
+    error = sqlite3.OperationalError("x")
+    error.sqlite_errorcode = extended
+    assert extended & 0xFF == code and jobs_files._is_busy(error) is busy
+
+
+def test_a_note_has_the_time_of_its_writing_whatever_it_says(tmp_path, monkeypatch):
+    now = datetime(2026, 3, 4, 5, 6, 7, 890123, tzinfo=UTC)
+    monkeypatch.setattr(jobs_files, "datetime", SimpleNamespace(now=now.astimezone))
+    jobs_files.note(tmp_path / "exit.json", code=3, at="never")
+    assert json.loads((tmp_path / "exit.json").read_text("utf-8")) == {"code": 3, "at": "2026-03-04T05:06:07Z"}
+
+
+@pytest.mark.parametrize(
+    ("data", "most", "text"),
+    [(b"0123456789", 10, "0123456789"), (b"0123456789", 9, "123456789"), (b"", 5, ""), ("aµb".encode(), 2, "\ufffdb")],
+)
+def test_the_end_of_a_file_is_its_last_bytes(tmp_path, data, most, text):
+    (tmp_path / "x").write_bytes(data)
+    assert (jobs_files._tail(tmp_path / "x", most), jobs_files._tail(tmp_path / "none", most)) == (text, "")
+
+
+@pytest.mark.parametrize(
+    ("line", "note"),
+    [
+        ('{"at": 1.5, "done": 2, "total": 7, "what": "w"}', (1.5, 2, 7, "w")),
+        ('{"at": "2.5", "done": "3", "total": 8.9, "what": 4}', (2.5, 3, 8, "4")),
+        ('{"at": 1.5, "done": NaN, "total": 7, "what": "w"}', None),
+        ('{"at": 1.5, "done": 2, "total": Infinity, "what": "w"}', None),
+        ('{"at": NaN, "done": 2, "total": 7, "what": "w"}', None),
+        ('{"at": 1.5, "done": 2, "total": 7}', None),
+        ('{"at": 1.5, "done": null, "total": 7, "what": "w"}', None),
+        ("[1.5, 2, 7]", None),
+        ("[" * 100_000, None),
+        ("", None),
+    ],
+)
+def test_a_line_of_progress_has_four_values_or_is_none(line, note):
+    assert jobs_files._progress(line) == note
+
+
+def test_an_order_is_written_with_its_place_as_it_is_seen_from_everywhere(studio, folder, monkeypatch):
+    monkeypatch.setattr(jobs_module, "start_waiting", lambda folder: None)
+    (folder / "work").mkdir()
+    given = Order("export", "µ title", ("campaign", "report", "x.ledger"), Path("work"), ("x.html", "y"))
+    job = studio.submit(given)
+    text = (job.folder / "job.json").read_text("utf-8")
+    said = json.loads(text)
+    queued = said.pop("queued")
+    assert said == {
+        "kind": "export",
+        "title": "µ title",
+        "arguments": ["campaign", "report", "x.ledger"],
+        "cwd": str(folder / "work"),
+        "results": ["x.html", "y"],
+        "folder": str(studio.folder),
+    }
+    assert (job.queued, job.cwd, job.state, job.results) == (queued, folder / "work", "queued", ("x.html", "y"))
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", queued) and text.startswith('{\n  "kind"')
+    assert (studio.folder / "last").read_text("utf-8") == "1" and studio.submit(given).number == 2
+    assert sorted(each.name for each in job.folder.iterdir()) == ["job.code", "job.json"]
+
+
+def test_the_process_of_a_job_is_started_beside_it_and_apart_from_this_one(waiting_job, monkeypatch):
+    asked = []
+
+    class Process:
+        def __init__(self, command, **settings):
+            asked.append((command, settings, settings["stderr"].name, settings["stderr"].mode))
+            jobs_files.note(waiting_job / "started.json")
+
+        def poll(self):
+            return None
+
+    begun = []
+    monkeypatch.setattr(jobs_process, "_started", begun)
+    monkeypatch.setattr(jobs_process.subprocess, "Popen", Process)
+    monkeypatch.setenv("OWN", "kept")
+    jobs_process._start(waiting_job)
+    ((command, how, errors, mode),) = asked
+    assert command == [sys.executable, "-P", "-m", "microrad.studio.jobs.process", str(waiting_job)]
+    assert (how["stdin"], how["stdout"], errors, mode) == (-3, -3, str(waiting_job / "stderr"), "ab")
+    assert (how["cwd"], how["env"]["OWN"], how["start_new_session"]) == (waiting_job.parent, "kept", True)
+    assert len(begun) == 1
+    begun[0].poll = lambda: 0
+    jobs_process.start_waiting(waiting_job.parent)
+    assert begun == [] and len(asked) == 1
+
+
+def test_the_program_of_a_job_is_told_who_watches_over_it():
+    own = (sys.executable, "-P", "-m", "microrad.studio.jobs.command", str(os.getpid()))
+    assert jobs_process._program() == own
