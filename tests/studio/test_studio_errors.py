@@ -1,5 +1,7 @@
 """What the studio's page of pointing shows of the budget of errors: the report's view, which follows the draft."""
 
+from types import SimpleNamespace
+
 import pytest
 
 import several_axes
@@ -64,3 +66,52 @@ def test_a_loop_that_is_not_there_or_of_several_axes_is_refused(tmp_path):
     named = several_axes.mission_text(("[fine_pointing]", '[fine_pointing]\nmirror_file = "two-axes.toml"'))
     with pytest.raises(ValueError, match="several axes: microrad run has the budget"):
         shown(opened(tmp_path, named + LOOP))
+
+
+def judged(monkeypatch, with_loop):
+    """Stands in for the budget of errors: what its parts are asked for."""
+    asked = []
+    monkeypatch.setattr(
+        errors.assembly, "of_mission", lambda *given: asked.append(given) or SimpleNamespace(with_loop=with_loop)
+    )
+    monkeypatch.setattr(errors.assembly, "judge", lambda of, loop: asked.append((of.with_loop, loop)) or "found")
+    monkeypatch.setattr(errors, "budget_figures", lambda found, stacked: f"figures of {found}, {stacked}")
+    monkeypatch.setattr(errors, "budget_view", lambda *given: given)
+    monkeypatch.setattr(errors, "_closed", lambda file: f"loop of {file.sources}")
+    return asked
+
+
+@pytest.mark.parametrize("with_loop", [False, True])
+def test_a_budget_has_a_loop_and_says_under_which_controller_where_it_asks_for_one(monkeypatch, with_loop):
+    asked = judged(monkeypatch, with_loop)
+    found, figures, said = errors.view(SimpleNamespace(sources="sources"), "table")
+    assert asked == [("table", "sources"), (with_loop, "loop of sources" if with_loop else None)]
+    words = "The loop is under PI here; microrad run takes the best controller of its study."
+    assert (found, figures, said) == ("found", "figures of found, True", [words] * with_loop)
+
+
+def test_the_loop_of_a_budget_is_closed_with_the_light_and_arrival_of_its_own_links(monkeypatch, tmp_path):
+    file = opened(tmp_path, SHIPPED.read_text("utf-8")).file()
+    asked = []
+
+    class Kept:
+        def part(self, make, scene):
+            asked.append(("kept", make is errors._designed))
+            return make(scene)
+
+    def design(scene, only):
+        asked.append((scene.theory, only))
+        return [SimpleNamespace(controller="the controller")]
+
+    monkeypatch.setattr(errors, "mirror_of_loop", lambda file: None)
+    monkeypatch.setattr(errors.mirror, "of", lambda mission: ("mirror", mission is file.mission))
+    monkeypatch.setattr(errors.link, "tracking_light_w", lambda of: ("light", of is file))
+    monkeypatch.setattr(errors.link, "arrival_of", lambda of: ("arrival", of is file))
+    monkeypatch.setattr(
+        errors.controller_study, "scene", lambda *given: asked.append(given[1:]) or SimpleNamespace(theory="theory")
+    )
+    monkeypatch.setattr(errors.controller_study, "design", design)
+    monkeypatch.setattr(errors.kept, "of_user", Kept)
+    monkeypatch.setattr(errors, "close", lambda theory, controller: f"{theory} under {controller}")
+    assert errors._closed(file) == "theory under the controller"
+    assert asked == [(("mirror", True), ("light", True), ("arrival", True)), ("kept", True), ("theory", ["PI"])]

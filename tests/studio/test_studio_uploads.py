@@ -1116,3 +1116,121 @@ def test_of_two_faults_of_a_name_the_first_is_told(name, fault):
     assert str(refusal.value) == f"the file {names.shown(name)} is not taken: {fault}; rename it and drop it again"
     typed = names.typed_words(refusal.value)
     assert typed == f"the file {names.shown(name)} is not taken: {fault}; choose another name"
+
+
+# ------------------------------------------------------------------------------------------- what is asked and answered
+@pytest.mark.parametrize(
+    ("answer", "code", "words"),
+    [
+        (b'{"refused": 5}', 0, "5"),
+        (b'{"refused": "", "channels": []}', 0, ""),
+        (b'"refused"', 3, "'b.csv' broke the program that reads it (code 3)"),
+        (b'["refused"]', 1, "'b.csv' broke the program that reads it (code 1)"),
+        (b"3", 2, "'b.csv' broke the program that reads it (code 2)"),
+        (b"null", 2, "'b.csv' broke the program that reads it (code 2)"),
+        (b"", -9, "'b.csv' took more than 7 s of computing"),
+        (b"\xff{}", 4, "'b.csv' broke the program that reads it (code 4)"),
+        (b'{"channels": [{"name": "a", "unit": "V"}], "time": null, "rates_hz": []}', 0, "'b.csv' broke the program"),
+        (b'{"channels": [], "time": "a", "rates_hz": []}', 0, "'b.csv' broke the program that reads it (code 0)"),
+    ],
+)
+@linux
+def test_an_answer_of_another_form_is_none(monkeypatch, answer, code, words):
+    monkeypatch.setattr(reading, "_run", lambda request, limits, name: (answer, code))
+    with pytest.raises(ReadingError) as refusal:
+        list_channels(Path("a/b.csv"), ReadingLimits(cpu_s=7))
+    assert str(refusal.value).startswith(words)
+    assert (str(refusal.value) == words) is (b'{"refused"' in answer)
+
+
+def test_a_reader_is_asked_for_a_file_in_its_folder_with_all_limits(monkeypatch):
+    asked = []
+    limits = ReadingLimits(1.5, 2, 3, 4, 5, 6, 7)
+    listed = {"channels": [{"name": "a", "unit": "V", "samples": None}], "time": 2, "rates_hz": [622.08, 5]}
+    shown = {
+        "samples": 9,
+        "rate_hz": 2.5,
+        "findings": ["f"],
+        "rows": [0, 8],
+        "drive": [[1, 2], [3, 4]],
+        "output": [[5, 6]],
+    }
+
+    def run(request, limits, name):
+        asked.append((json.loads(request), limits, name))
+        return json.dumps(listed if len(asked) == 1 else shown).encode(), 0
+
+    monkeypatch.setattr(reading, "_run", run)
+    found = list_channels(Path("a b/µ.csv"), limits)
+    assert found == reading.Listing((reading.ChannelInfo("a", "V", None),), 2, (622.08, 5.0))
+    seen = view(Path("a b/µ.csv"), Columns((0, "u"), ("y",), 622.08, ("drift",)))
+    assert seen == reading.View(9, 2.5, ("f",), (0, 8), ((1.0, 2.0), (3.0, 4.0)), ((5.0, 6.0),))
+    place = {"folder": "a b", "name": "µ.csv"}
+    columns = {"inputs": [0, "u"], "outputs": ["y"], "rate_hz": 622.08, "accept": ["drift"]}
+    assert asked == [
+        ({"task": "channels", "limits": asdict(limits), **place}, limits, "µ.csv"),
+        ({"task": "view", "columns": columns, "limits": asdict(ReadingLimits()), **place}, ReadingLimits(), "µ.csv"),
+    ]
+
+
+def test_channels_are_listed_up_to_the_limit_with_the_rates_of_those(monkeypatch):
+    source = SimpleNamespace(
+        names=["u" * 201, "t [s]", "time", "late"],
+        units=["V", "s" * 300, "", "mrad"],
+        samples=lambda: [3, None, 5, 7],
+        rates=lambda which: [SimpleNamespace(rate_hz=(50.5, 622.08, 50.5, 9.0)[k]) for k in reversed(which)],
+    )
+    monkeypatch.setattr(process, "opened", lambda path, request: source)
+    found = process.channels(Path("a"), {"limits": {"channels": 3}})
+    named = [("u" * 200, "V", 3), ("t [s]", "s" * 200, None), ("time", "", 5)]
+    assert found == {
+        "channels": [dict(zip(("name", "unit", "samples"), each, strict=True)) for each in named],
+        "time": 1,
+        "rates_hz": [50.5, 622.08],
+    }
+
+
+def test_a_form_gives_one_file_and_is_closed_whatever_becomes_of_it(tmp_path, monkeypatch):
+    drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
+    closed, limits, said, taken = [], [], [], []
+
+    class Form(dict):
+        async def close(self):
+            closed.append(len(self))
+
+    class Request:
+        def __init__(self, **sent):
+            self.sent = sent
+
+        async def form(self, **given):
+            limits.append(given)
+            return Form(self.sent)
+
+    def file(name, data=b"1,2\n"):
+        return drop.UploadFile(io.BytesIO(data), filename=name)
+
+    async def take(upload):
+        taken.append((upload.name, upload.path.read_bytes()))
+        raise asyncio.CancelledError
+
+    async def send():
+        monkeypatch.setattr(drop, "_TURNS", asyncio.Semaphore(1))
+        forms = (
+            {"file": file("a.csv"), "word": "x"},
+            {"file": file(None)},
+            {"word": "x"},
+            {"file": file("b", bytes(1001))},
+        )
+        answers.extend([await field._take(Request(**sent)) for sent in forms])
+
+    monkeypatch.setattr(drop, "_BLOCK_BYTES", 3)
+    field, answers = drop.Drop.__new__(drop.Drop), []
+    field._uploads, field._refused, field._taken = Uploads(tmp_path / "uploads", LIMITS), said.append, take
+    asyncio.run(send())
+    assert (closed, limits) == ([2, 1, 1, 1], [{"max_files": 1, "max_fields": 1}] * 4)
+    assert [(answer.status_code, answer.body) for answer in answers] == [(200, b"read")] * 4
+    assert taken == [("a.csv", b"1,2\n")]
+    assert [words.partition(";")[0] for words in said] == [
+        "the file '' is not taken: it has no name",
+        "the file 'b' has more than 0.001 MB",
+    ]
