@@ -813,3 +813,96 @@ def test_a_file_that_cannot_be_read_is_not_written_over(draft, monkeypatch):
         draft.set(APERTURE, "8 cm").save()
     assert str(refusal.value) == f"{draft.path} cannot be written: Permission denied; choose another name"
     assert draft.on_disk() == "changed"
+
+
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        ("\ufeffa\r\nb\nc\r\n", [1, 2, 4, 5, 6, 7, 9]),
+        ("a\r\nb\nc\r\n", [0, 1, 3, 4, 5, 6, 8]),
+        ("\r\n\r\n", [0, 2, 4]),
+        ("\ufeff", [1]),
+        ("a\rb\r\n", [0, 1, 2, 3, 5]),
+    ],
+)
+def test_each_character_of_a_plain_text_has_its_place_in_the_text_as_it_is(text, places):
+    plain = drafts._plain(text)
+    assert [drafts._as_written(text, place) for place in range(len(plain) + 1)] == places
+    lines = plain.split("\n")
+    begins = [sum(len(line) + 1 for line in lines[:n]) for n in range(len(lines))]
+    found = [drafts._line_begin(plain, n + 1) for n in range(len(lines) + 2)]
+    assert found == [*begins, len(plain), len(plain)]
+
+
+@pytest.mark.parametrize(
+    ("key", "unit", "wanted", "example"),
+    [
+        (APERTURE, "m", "a length with its unit, above 0 m, at most 100 m", "5 cm"),
+        ("acquisition.attempts", "", "a whole number without quotes, from 1 to 1000", "2"),
+        ("orbit.leo.limits.in_eclipse", "", "true or false, without quotes", "true"),
+        ("conventions.strehl", "", '"decibel" or "ratio" or "unused"', "decibel"),
+        (
+            "scenario.pid_frequencies",
+            "Hz",
+            "a list, rising, each item a frequency with its unit, above 0 Hz, at most 1 THz",
+            '["5 Hz"]',
+        ),
+        (
+            "error_budget.sources.mine.gains",
+            "",
+            "a list, each item a number without quotes, at least -1e+06, at most 1e+06",
+            "[5.0]",
+        ),
+        (
+            "orbit.leo.inclination",
+            "rad",
+            'an angle with its unit, at least 0 deg, at most 180 deg, or "sun-synchronous"',
+            "5 deg",
+        ),
+        ("pointing.confidence", "", "a number without quotes, above 0 and below 1", "0.5"),
+    ],
+)
+def test_a_key_says_what_it_wants_with_an_example_that_is_taken(key, unit, wanted, example):
+    found = key_of(key)
+    assert (found.unit, found.wanted, found.example) == (unit, wanted, example)
+    assert value_of(found.toml(example)) is not None
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        (
+            "m.toml",
+            "{path} was changed since it was opened here, in another tab or by another program, and is left as it "
+            "is; save this text under another name, or open the file again and lose the changes made here",
+        ),
+        ("other.toml", "{path} exists and is left as it is; choose another name, or open that file instead"),
+        (
+            "no/m.toml",
+            "{path} cannot be written: No such file or directory; check free space and permissions, or save "
+            "under another name",
+        ),
+    ],
+)
+def test_a_text_that_cannot_be_saved_says_why_and_what_to_do(draft, tmp_path, place, words):
+    (tmp_path / "m.toml").write_text("theirs", "utf-8")
+    (tmp_path / "other.toml").write_text("theirs", "utf-8")
+    path = tmp_path / place
+    with pytest.raises(DraftError) as refusal:
+        draft.set(APERTURE, "8 cm").save(path)
+    assert str(refusal.value) == words.format(path=path)
+    assert not path.exists() or path.read_text("utf-8") == "theirs"
+
+
+@pytest.mark.parametrize(
+    ("text", "mirror", "there"),
+    [
+        ("[mirror]\na=1\n[b]\n[mirror.x]\nc=[\n1,\n]\n# end\n", [1, 2, 4, 5, 6, 7], {"mirror", "mirror.x", "b"}),
+        ("[mirrors]\na=1\n[mirror.x.y]\n# in\nb=1\n", [3, 4, 5], {"mirrors", "mirror", "mirror.x", "mirror.x.y"}),
+        ("a = 1\n[[mirror]]\nb=1\n\n# between\n[[mirror]]\n", [2, 3, 4, 5, 6], {"mirror"}),
+        ("mirror = 1\n[x]\nmirror.a = 2\n", [], {"x"}),
+    ],
+)
+def test_the_lines_of_a_mirror_are_those_of_its_tables(text, mirror, there):
+    assert sorted(tables._lines_of_mirror(text)) == mirror
+    assert tables._tables(text) == tables._tables(text.replace("\n", "\r\n")) == there
