@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -1519,3 +1520,93 @@ def test_of_two_sliders_that_are_moved_the_first_of_the_board_is_asked_for(sessi
     row = board.rows[other]
     assert row._turned(float(row.slider.steps)) == row.slider.at(row.slider.steps) == row.typed
     assert told[other][-1] == {"text": row.typed}
+
+
+# ---------------------------------------------------------------------------------------------- the frame and the field
+def test_a_field_for_files_has_its_own_address_and_limit_until_its_page_is_closed(tab, tmp_path, monkeypatch):
+    routes, heard = [], []
+    monkeypatch.setattr(drop.app, "add_api_route", lambda *given, **more: routes.append((*given, more)))
+    monkeypatch.setattr(drop.app, "remove_route", routes.append)
+    monkeypatch.setattr(drop.ui.element, "on", lambda self, *given, **more: heard.append((*given, more["js_handler"])))
+    uploads, deleted = mirror.Uploads(tmp_path / "uploads", UploadLimits(file_bytes=123_457)), []
+    monkeypatch.setattr(tab, "on_delete", deleted.append)
+    fields = [drop.Drop(uploads, taken, taken) for taken in (None, None)]
+    urls = [url for url, _, _ in routes]
+    assert len({*urls}) == 2 and all(url.startswith(f"/_nicegui/client/{tab.id}/upload/") for url in urls)
+    how = {"methods": ["POST"], "include_in_schema": False}
+    assert [(take, more) for _, take, more in routes] == [(field._take, how) for field in fields]
+    for (event, unsent, script), field, url in zip(heard, fields, urls, strict=True):
+        assert (event, unsent) == ("change", field._unsent)
+        assert f'fetch("{url}", ' in script and "file.size > 123457)" in script
+        assert "URL" not in script and "MOST" not in script
+    routes.clear()
+    for each in reversed(deleted):
+        each()
+    assert routes == urls[::-1]
+
+
+@pytest.mark.parametrize(
+    ("changed", "disk", "faults", "words"),
+    [
+        (False, "", 0, "saved"),
+        (True, "", 0, "not saved"),
+        (False, "gone", 1, "not saved, 1 fault to correct, gone from disk"),
+        (False, "changed", 2, "2 faults to correct, changed on disk; open it again"),
+        (True, "changed", 0, "not saved, changed on disk; open it again"),
+        (False, "", 3, "saved, 3 faults to correct"),
+    ],
+)
+def test_the_head_of_a_page_says_what_is_saved_and_what_is_wrong(changed, disk, faults, words):
+    assert layout._words(SimpleNamespace(changed=changed, problems=("fault",) * faults), disk) == words
+
+
+@pytest.mark.parametrize(("error", "words"), [(JobError("no job"), "no job"), (OSError("full"), "full")])
+def test_what_is_refused_is_told_and_not_done(told, error, words):
+    done = []
+
+    def refuse():
+        raise error
+
+    assert layout.attempt(lambda: done.append(1)) and (done, told) == ([1], [])
+    assert not layout.attempt(refuse) and told == [words]
+    with pytest.raises(KeyError):
+        layout.attempt(lambda: {}["none"])
+
+
+@pytest.mark.parametrize(
+    ("refused", "python", "said"),
+    [
+        ("", False, ("Copied: microrad budget 'a b.toml'", "positive")),
+        ("", True, ("Copied: from microrad.link.study import run_link_study ...", "positive")),
+        ("denied", False, ("Not copied, denied: microrad budget 'a b.toml'", "negative")),
+    ],
+)
+def test_what_was_copied_is_told_by_its_first_line_and_what_was_not_as_a_whole(monkeypatch, refused, python, said):
+    asked, told = [], []
+
+    async def run(script, timeout):
+        asked.append((script, timeout))
+        return refused
+
+    monkeypatch.setattr(layout.ui, "run_javascript", run)
+    monkeypatch.setattr(layout.ui, "notify", lambda words, type, **how: told.append((words, type)))
+    asyncio.run(layout._copy(None, python))
+    action = commands.budget(Path("a b.toml"))
+    asyncio.run(layout._copy(action, python))
+    text = action.python if python else action.command
+    ((script, timeout),) = asked
+    assert (told, timeout) == ([said], layout.COPY_S) and f"writeText({json.dumps(text)})" in script
+
+
+def test_a_page_follows_the_session_and_does_not_show_what_it_has_changed_itself(tab, monkeypatch):
+    timers, shown = [], []
+    state = SimpleNamespace(revision=3, disk="")
+    monkeypatch.setattr(layout.ui, "timer", lambda every_s, look: timers.append((every_s, look)))
+    mark = layout.follow(state, lambda: shown.append(state.revision))
+    ((every_s, look),) = timers
+    assert (every_s, shown) == (layout.POLL_S, [3])
+    for state.revision, own in ((3, False), (5, False), (6, True), (4, False)):
+        if own:
+            mark()
+        look()
+    assert shown == [3, 5, 4]
