@@ -2117,3 +2117,18 @@ def test_recordings_of_several_channels_are_identified_with_their_units_and_file
     (folder / "a-mirror.toml").write_text("mine", "utf-8")
     with pytest.raises(frame.Refusal, match=r"a-mirror\.toml was not written by microrad .* --mirror-file\.$"):
         target.check()
+
+
+@pytest.mark.parametrize(
+    ("text", "begins"),
+    [
+        ("50 V", '"50 V" '),
+        ("nan", '"nan Hz" does not begin with a plain number; expected a frequency with its unit'),
+        ("1_000", '"1_000 Hz" '),
+        ("fast", '"fast" does not begin with a plain number; expected a frequency with its unit'),
+    ],
+)
+def test_what_is_no_rate_is_refused_in_the_words_of_a_frequency(text, begins):
+    with pytest.raises(typer.BadParameter) as refusal:
+        lab._rate(text)
+    assert str(refusal.value).startswith(begins) and "a frequency with its unit" in str(refusal.value)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from microrad.cli import coupled as cli_coupled
 from microrad.cli import recordings
 from microrad.cli.coupled import refuse_options
 from microrad.cli.frame import Refusal
@@ -469,3 +470,63 @@ def test_an_option_for_one_drive_and_one_output_is_refused_with_the_numbers_of_e
         Refusal, match="--seed is for one drive and one output, and these recordings have 3 and 2: leave"
     ):
         refuse_options(given, {"--static": False, "--seed": True})
+
+
+@pytest.mark.parametrize(("stopped", "as_json"), [(False, False), (True, False), (False, True)])
+def test_what_was_said_of_several_channels_is_handed_on_and_their_files_are_written_last(
+    folder, monkeypatch, capsys, stopped, as_json
+):
+    from microrad import report
+
+    steps = []
+    given = recordings.Given(("fitted",), ("checked",), True, "listed", None, ((0.0, 1.0), (2.0, 3.0)), ("signs",))
+    target = cli_coupled.Target(Path("m.toml"), Path("p.html"), "the title", True, lambda: steps.append("checked"))
+    found = SimpleNamespace(stopped=stopped)
+    files = {"mirror_file": target.mirror_file, "report_file": target.page}
+
+    def identify(*fitted, **more):
+        assert callable(more.pop("on_progress"))
+        steps.append((fitted, more))
+        return found
+
+    def write(*given, **more):
+        assert not (folder / "m.toml").exists()
+        steps.append((given, more))
+
+    monkeypatch.setenv("COLUMNS", "93")
+    monkeypatch.setattr(coupled, "identify_coupled", identify)
+    monkeypatch.setattr(
+        "microrad.lab.identify.coupled.mirror_file.coupled_file_text", lambda found, every, title: f"# {every} {title}"
+    )
+    monkeypatch.setattr(
+        report, "coupled_identification_text", lambda found, width, **more: f"{width} wide, {more == files}"
+    )
+    monkeypatch.setattr(report, "coupled_identification_data", lambda found, **more: {"same": more == files})
+    monkeypatch.setattr(report, "write_coupled_identification", write)
+    outcome = cli_coupled.identify_channels(given, ("mV", "um"), "said", target, as_json)
+    assert outcome.code == (130 if stopped else 0)
+    assert outcome.text == ('{\n  "same": true\n}' if as_json else "said\n\n93 wide, True")
+    text = "# ('fitted', 'checked') the title"
+    asked = {"drive_unit": "mV", "output_unit": "um", "positions_m": given.positions_m, "signs": ("signs",)}
+    page = {
+        "mirror_file": Path("m.toml"),
+        "mirror_text": text,
+        "title": "the title",
+        "overwrite": True,
+        "virtual": True,
+    }
+    first = (("fitted",),), {"validation": ("checked",), **asked}
+    assert steps == [first, "checked", ((found, Path("p.html")), page)]
+    assert (folder / "m.toml").read_text("utf-8") == text
+    said = "microrad: stopped; the best model so far was written\n" if stopped else ""
+    assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize("title", ["", " \t"])
+def test_a_mirror_of_several_channels_without_a_name_is_refused_before_it_is_fitted(monkeypatch, title):
+    monkeypatch.setattr(coupled, "identify_coupled", lambda *given, **more: pytest.fail("it ran"))
+    target = cli_coupled.Target(Path("m.toml"), Path("p.html"), title, False, lambda: None)
+    with pytest.raises(Refusal) as refusal:
+        cli_coupled.identify_channels(None, ("V", "m"), "said", target, False)
+    words = "the mirror has no name; give one with --name, it stands in the mirror file and in the report."
+    assert str(refusal.value) == words
