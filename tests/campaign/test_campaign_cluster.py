@@ -418,3 +418,142 @@ def test_a_result_that_cannot_be_fetched_is_computed_again(error):
     )
     assert list(DaskEngine._finished(engine, 3, "queue")) == []
     assert again == ["waited", (3, "queue")]
+
+
+# ------------------------------------------------------------------------------------------ stand-ins for the cluster
+class Deed:
+    """Work that lives twice and then gives its job's name, or fails."""
+
+    def __init__(self, error=None, between=lambda: None):
+        self.error, self.between = error, between
+
+    def do(self, job, beat):
+        beat()
+        self.between()
+        beat()
+        if self.error:
+            raise self.error
+        return f"{job.cell}/{job.number}/{job.row}/{job.kind}".encode()
+
+
+@pytest.fixture
+def on_worker(monkeypatch):
+    """What a worker answers to a job, and what it has told its scheduler, for a work of this name."""
+    told = []
+    there = SimpleNamespace(address="tcp://w:1", log_event=lambda topic, said: told.append((topic, said)))
+    monkeypatch.setattr("distributed.get_worker", lambda: there)
+    monkeypatch.setattr(cluster, "_tell_now", lambda worker, topic, said: told.append((worker.address, topic, said)))
+    monkeypatch.setattr(cluster, "code_sha256", lambda target: "c0de")
+    monkeypatch.setattr(cluster, "_openings", {})
+
+    def answered(made, name="work", every_s=0.0):
+        monkeypatch.setattr(cluster, "open_target", lambda target, spec: made())
+        cluster.install("work", "m:f", b"", "c0de")
+        found = cluster.do(name, "topic", 5, (3, 1, 2, "row"), every_s)
+        return cluster.Kind(found[0]).name, found[1:].decode(), told
+
+    return answered
+
+
+BEGUN, LIVES = ("tcp://w:1", "topic", [5, "tcp://w:1"]), ("topic", [5, "tcp://w:1"])
+
+
+def refused():
+    raise CampaignError("no µ\n mission")
+
+
+def forgotten():
+    cluster.forget("work")
+
+
+@pytest.mark.parametrize(
+    ("made", "name", "every_s", "answer", "told"),
+    [
+        (Deed, "work", 0.0, ("DONE", "3/1/2/row"), [BEGUN, LIVES, LIVES]),
+        (Deed, "work", 3600.0, ("DONE", "3/1/2/row"), [BEGUN, LIVES]),
+        (lambda: Deed(ValueError("no µ")), "work", 0.0, ("RAISED", "ValueError: no µ"), [BEGUN, LIVES, LIVES]),
+        (lambda: Deed(SystemExit(3)), "work", 3600.0, ("RAISED", "SystemExit: 3"), [BEGUN, LIVES]),
+        (
+            lambda: Deed(between=lambda: cluster.forget("work")),
+            "work",
+            0.0,
+            ("RAISED", "_StoppedError"),
+            [BEGUN, LIVES],
+        ),
+        (refused, "work", 0.0, ("REFUSED", "the worker at tcp://w:1: no µ mission"), []),
+        (Deed, "other", 0.0, ("OPEN", "tcp://w:1"), []),
+    ],
+)
+def test_a_worker_answers_for_its_job_and_tells_when_it_begins_and_lives(on_worker, made, name, every_s, answer, told):
+    assert on_worker(made, name, every_s) == (*answer, told)
+
+
+def flying(where="tcp://a", forgiven=()):
+    """An engine with two jobs under way, the second at some worker."""
+    engine = object.__new__(DaskEngine)
+    engine._flights = {1: Flight(Job(3, 5), 99.0, "tcp://b"), 2: Flight(Job(4, 6), 98.0, where)}
+    engine._futures = {k: SimpleNamespace(status="error") for k in engine._flights}
+    engine._forgiven = set(forgiven)
+    return engine
+
+
+@pytest.mark.parametrize(
+    ("where", "forgiven", "allowed", "reason"),
+    [
+        ("tcp://a", (1,), 0, "its worker at tcp://a ended"),
+        ("tcp://a", (1,), 2, "its worker at tcp://a ended, the last of 3 that it was tried on"),
+        ("tcp://a", (2,), 0, None),  # killed for its neighbour
+        ("tcp://b", (), 0, None),  # begun elsewhere
+        ("", (), 0, None),  # not begun at all
+    ],
+)
+def test_a_job_dies_with_the_worker_that_it_had_begun_on_alone(where, forgiven, allowed, reason):
+    engine, queue = flying(where, forgiven), JobQueue(iter(()))
+    error = KilledWorker("job", SimpleNamespace(address="tcp://a"), allowed)
+    found = [(each.job, each.kind, each.reason) for each in engine._failed(2, error, queue)]
+    assert found == ([(Job(4, 6), "died", reason)] if reason else [])
+    assert queue.next() == (None if reason else Job(4, 6))
+    assert (list(engine._flights), engine._forgiven) == ([1], set(forgiven) - {2})
+
+
+def test_an_error_that_is_no_death_is_the_jobs_and_a_worker_without_microrad_the_campaigns():
+    engine = flying()
+    (raised,) = engine._failed(2, KeyError("a\nb"), JobQueue(iter(())))
+    assert (raised.job, raised.kind, raised.reason, raised.payload) == (Job(4, 6), "raised", "KeyError: 'a\\nb'", b"")
+    with pytest.raises(CampaignError) as told:
+        list(engine._failed(1, ModuleNotFoundError("No module named 'microrad'"), JobQueue(iter(()))))
+    assert str(told.value) == (
+        "a worker has no microrad that fits (ModuleNotFoundError: No module named 'microrad'): install it there"
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError("Timed out trying\n to connect"), "OSError: Timed out trying to connect"),
+        (ValueError("unknown address scheme"), "ValueError: unknown address scheme"),
+        (TimeoutError(), "TimeoutError: it did not answer for 0.25 s"),
+        (AssertionError("no loop"), "AssertionError: no loop"),
+    ],
+)
+def test_a_scheduler_that_cannot_be_reached_is_told_by_its_address_and_all_is_undone(monkeypatch, error, words):
+    closed = []
+
+    async def identity():
+        raise error
+
+    async def close_rpc():
+        closed.append("rpc")
+
+    rpc = SimpleNamespace(identity=identity, close_rpc=close_rpc)
+    engine = object.__new__(DaskEngine)
+    engine.address, engine._clock = "tcp://s:9", SimpleNamespace(close=lambda: closed.append("clock"))
+    engine._undo_quiet = lambda: closed.append("quiet")
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.25)
+    with pytest.raises(CampaignError) as told:
+        engine._connect(SimpleNamespace(rpc=lambda address: rpc))
+    assert str(told.value) == (
+        f"no scheduler answers at tcp://s:9 ({words}): start one with `dask scheduler`, and say the address that it "
+        "prints"
+    )
+    assert closed == ["rpc", "clock", "quiet"]

@@ -2,6 +2,7 @@
 
 import io
 import json
+import logging
 import math
 import os
 import random
@@ -17,8 +18,9 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
+from microrad.campaign.engines import cluster, local
 from microrad.campaign.engines import jobs as engine_jobs
-from microrad.campaign.engines import local
+from microrad.campaign.engines import worker as engine_worker
 from microrad.campaign.engines.cluster import DaskEngine, Flight, late_flights
 from microrad.campaign.engines.jobs import Clock
 from microrad.campaign.engines.local import LocalEngine
@@ -769,3 +771,311 @@ def test_a_job_put_back_is_the_next_and_its_iterator_is_asked_again():
     queue.put_back(Job(0, 7))
     queue.put_back(Job(0, 8))
     assert [queue.next() for _ in range(4)] == [Job(0, 8), Job(0, 7), Job(0, 2), None]
+
+
+def two_flights(status="finished", body=b"", **changes):
+    """A cluster's engine with two jobs under way in two cells, the second of which has ended like that."""
+    asked = []
+    ended = SimpleNamespace(status=status, result=lambda timeout: body)
+    ended.cancel = lambda **options: asked.append(options["force"])
+    engine = a_cluster(_forgiven={1, 2}, _installed={"tcp://a", "tcp://b"}, _looked_s=7.0, **changes)
+    engine._flights = {1: Flight(Job(3, 5), 99.0, "tcp://a"), 2: Flight(Job(4, 6, 9, "row"), 98.0, "tcp://b")}
+    engine._futures = {1: SimpleNamespace(status="pending"), 2: ended}
+    return engine, asked
+
+
+@pytest.mark.parametrize(
+    ("kind", "body", "outcome", "again", "installed"),
+    [
+        (Kind.DONE, b"\x04\xff", ("done", b"\x04\xff", ""), False, "ab"),
+        (Kind.DONE, b"", ("done", b"", ""), False, "ab"),
+        (Kind.RAISED, "no µrad".encode(), ("raised", b"", "no µrad"), False, "ab"),
+        (Kind.OPEN, b"tcp://b", None, True, "a"),
+        (Kind.OPEN, b"tcp://c", None, True, "ab"),
+    ],
+)
+def test_an_answer_of_a_worker_is_that_of_its_own_job(kind, body, outcome, again, installed):
+    engine, asked = two_flights(body=bytes([kind]) + body)
+    queue = engine_jobs.JobQueue(iter(()))
+    found = list(engine._task_ended(2, queue))
+    assert [(each.job, each.kind, each.payload, each.reason) for each in found] == (
+        [(Job(4, 6, 9, "row"), *outcome)] if outcome else []
+    )
+    assert (list(engine._flights), list(engine._futures), engine._forgiven, asked) == ([1], [1], {1}, [])
+    assert queue.next() == (Job(4, 6, 9, "row") if again else None)
+    assert engine._installed == {f"tcp://{each}" for each in installed}
+    assert engine._looked_s == (-math.inf if again else 7.0), "the worker gets it at the next look, which is at once"
+
+
+@pytest.mark.parametrize(("status", "again"), [("cancelled", True), ("lost", True), ("pending", False)])
+def test_a_task_without_an_end_of_its_own_starts_again_and_one_under_way_goes_on(status, again):
+    engine, _ = two_flights(status)
+    queue = engine_jobs.JobQueue(iter(()))
+    assert list(engine._task_ended(2, queue)) == []
+    assert list(engine._flights) == ([1] if again else [1, 2])
+    assert queue.next() == (Job(4, 6, 9, "row") if again else None)
+
+
+@pytest.mark.parametrize("status", ["pending", "finished"])
+def test_a_job_that_is_dropped_is_taken_back_where_it_is_still_to_come(status):
+    engine, asked = two_flights(status)
+    assert engine._drop(2) == Flight(Job(4, 6, 9, "row"), 98.0, "tcp://b")
+    assert asked == [True] * (status == "pending")
+    engine._futures[1].cancel = lambda force: 1 / 0
+    assert engine._drop(1).job == Job(3, 5)
+    assert (engine._flights, engine._futures, engine._forgiven) == ({}, {}, set())
+
+
+def test_a_job_goes_to_a_cluster_by_its_numbers_under_its_own_key_and_in_its_order():
+    engine, sent, called = a_cluster(_ended=[]), [], []
+    engine._ended = SimpleNamespace(put=called.append)
+    future = SimpleNamespace(add_done_callback=lambda call: call("future"))
+    engine._client.submit = lambda *args, **options: (sent.append((args, options)), future)[1]
+    engine._launch(5, Job(1, 2, 3, "trace"))
+    arguments = (cluster.do, "work", "topic", 5, (1, 2, 3, "trace"), 1.0)  # a tenth of what is late
+    assert sent == [(arguments, {"key": "topic-5", "pure": False, "priority": -5})]
+    assert (engine._flights, engine._futures, called) == ({5: Flight(Job(1, 2, 3, "trace"))}, {5: future}, [5])
+    assert not engine._flights[5].begun
+
+
+def test_each_new_worker_gets_the_specification_and_one_that_is_busy_is_asked_again():
+    engine, asked = a_cluster(_target="m:f", _spec=b"spec", _code="c0de", _installed={"old"}), []
+
+    def call(what, *args, workers):
+        asked.append((what, *args, *workers))
+        if workers != ["b"]:
+            raise {"a": OSError, "c": TimeoutError, "d": ModuleNotFoundError}[workers[0]]("no module\nmicrorad")
+
+    engine._call, engine._client._run = call, "run"
+    engine._install([])
+    engine._install(["a", "b", "c"])
+    assert asked == [("run", cluster.install, "work", "m:f", b"spec", "c0de", each) for each in "abc"]
+    assert engine._installed == {"old", "b"}
+    with pytest.raises(CampaignError) as told:
+        engine._install(["b", "d"])
+    assert str(told.value) == (
+        "the worker at d has no microrad that fits (ModuleNotFoundError: no module microrad); the campaign's code is "
+        "c0de: install the same version there"
+    )
+
+
+@pytest.mark.parametrize(("threads", "jobs", "expects"), [({}, 1, True), ({}, 0, False), ({"a": 1}, 1, False)])
+def test_jobs_are_waited_with_as_long_as_there_are_no_workers(threads, jobs, expects):
+    queue = engine_jobs.JobQueue(Job(0, k) for k in range(jobs))
+    assert a_cluster(_threads=threads)._expects(queue) is expects
+    assert queue.next() == (Job(0, 0) if jobs else None), "it is still to come"
+
+
+@pytest.mark.parametrize(
+    ("states", "told"),
+    [
+        (["running"], False),
+        (["connecting", "connecting", "running"], False),
+        (["connecting", "closed"], True),
+        (["connecting"] * 60, True),
+    ],
+)
+def test_a_connection_may_come_back_within_seconds(monkeypatch, states, told):
+    seconds = iter(range(1000))
+    clock = SimpleNamespace(monotonic=lambda: 0.1 * next(seconds), sleep=lambda s: None)
+    monkeypatch.setattr(cluster, "time", clock)
+
+    class Client(list):
+        status = property(lambda self: self.pop(0) if len(self) > 1 else self[0])
+
+    engine = a_cluster(_client=Client(state for state in states for _ in range(2)))  # read twice a turn
+    if told:
+        with pytest.raises(CampaignError, match=r"^the scheduler at tcp://here is gone \(the connection was lost\)$"):
+            engine._wait_for_scheduler()
+        assert next(seconds) < 54
+    else:
+        engine._wait_for_scheduler()
+
+
+def test_the_workers_forget_a_campaign_once_where_the_scheduler_is_there():
+    engine, asked = two_flights("pending")
+    engine._call = lambda *args, **options: asked.append((args, options))
+    engine._client._run, engine._undo_quiet = "run", lambda: asked.append("undone")
+    engine._client.close = lambda **options: asked.append(options["timeout"])
+    engine._clock.close = lambda: asked.append("clock")
+    engine._futures[1].cancel = lambda force: 1 / 0
+    engine.close()
+    engine.close()
+    forgets = (("run", cluster.forget, "work"), {"on_error": "ignore", "answer_s": 1.0})
+    assert asked == [True, forgets, 1.0, "clock", "undone"]
+    assert engine._flights == {}
+    engine._client.status = "closed"
+    engine._take_back()
+    assert len(asked) == 5
+    engine._client.status, engine._call = "running", lambda *args, **options: 1 / 0
+    engine._take_back()
+
+
+def test_late_jobs_of_two_workers_stop_both_in_their_order():
+    engine, killed = a_cluster(_flights={}, _forgiven={9}), []
+    places = enumerate(["z", "a", "m", "z", "a"], 3)
+    heard = {3: 80.0, 4: 81.0, 5: 99.0, 6: 97.0, 7: 98.5}
+    engine._flights = {k: Flight(Job(k, 2 * k), heard[k], where) for k, where in places}
+    engine._futures = {k: SimpleNamespace(status="finished") for k in engine._flights}
+    engine._look, engine._kill = (lambda: None), killed.append
+    found = [(each.job, each.kind, each.reason) for each in engine._stop_the_late()]
+    assert found == [(Job(k, 2 * k), "late", "gave no sign of life for 10 s and was stopped") for k in (3, 4)]
+    assert (killed, engine._forgiven, list(engine._flights)) == (["a", "z"], {6, 7, 9}, [5, 6, 7])
+
+
+def test_a_specification_is_opened_once_and_kept_by_its_first_name(monkeypatch):
+    opened = []
+    monkeypatch.setattr(cluster, "_openings", {})
+    monkeypatch.setattr(cluster, "open_target", lambda target, spec: opened.append((target, spec)) or "work")
+    monkeypatch.setattr(cluster, "code_sha256", lambda target: f"of {target}")
+    cluster.install("one", "m:f", b"1", "of m:f")
+    cluster.install("two", "m:g", b"2", "of m:f")
+    cluster.install("one", "m:h", b"3", "other")
+    one, two = cluster._openings["one"], cluster._openings["two"]
+    assert [one.opened(), one.opened(), opened] == ["work", "work", [("m:f", b"1")]]
+    with pytest.raises(CampaignError, match=r"^runs other code of microrad: of m:g, where the campaign's is of m:f$"):
+        two.opened()
+    cluster.forget("two")
+    cluster.forget("two")
+    assert (one.stopped, two.stopped, list(cluster._openings)) == (False, True, ["one"])
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (CampaignError("a\n  b"), "a b"),
+        (ValueError("a\n\n b\tc"), "ValueError: a b c"),
+        (KeyError(), "KeyError"),
+        (CampaignError(""), ""),
+        (OSError(28, "No space left"), "OSError: [Errno 28] No space left"),
+        (ValueError("x" * 1200), "ValueError: " + "x" * 1000),
+    ],
+)
+def test_an_error_is_one_line_of_words(error, words):
+    assert engine_worker.words(error) == words
+
+
+def test_a_sign_of_life_is_told_again_when_its_time_is_over(monkeypatch):
+    times, told = iter([5.0, 6.9, 7.0, 8.9, 10.5, 12.4, 12.5]), []
+
+    def times_now():
+        told.append(next(times))
+        return told[-1]
+
+    monkeypatch.setattr(engine_worker, "time", SimpleNamespace(monotonic=times_now))
+    heard, beat = [], Beat(lambda: heard.append(told[-1]), every_s=2.0)
+    for _ in range(7):
+        beat()
+    assert heard == [5.0, 7.0, 10.5, 12.5]
+
+
+class Asked(list):
+    """Messages for a worker; it ends behind the last."""
+
+    def get(self):
+        if not self:
+            raise SystemExit
+        return self.pop(0)
+
+
+def served(monkeypatch, *bodies, target="campaign_target:open_work", late_s=10.0):
+    """What a worker says to the specification and to each job."""
+    said = io.BytesIO()
+    monkeypatch.setenv("CODE_OF_TARGET", "abc")
+    messages = Asked(
+        [Message(Kind.OPEN, bodies[0]), *(Message(Kind.JOB, json.dumps(job).encode()) for job in bodies[1:])]
+    )
+    try:
+        engine_worker._serve(target, late_s, messages, said)
+    except SystemExit:
+        assert messages == []
+    said.seek(0)
+    return [(each.kind.name, each.body) for each in iter(lambda: read_message(said), None)]
+
+
+@pytest.mark.parametrize(
+    ("spec", "target", "words"),
+    [
+        (b"refuse", "campaign_target:open_work", b"mission.toml: no such mission"),
+        (b"{}", "campaign_target:none", b"AttributeError: module 'campaign_target' has no attribute 'none'"),
+        (b"{}", "no_such:f", b"ModuleNotFoundError: No module named 'no_such'"),
+    ],
+)
+def test_a_worker_that_cannot_open_its_work_says_why_and_ends(monkeypatch, spec, target, words):
+    assert served(monkeypatch, spec, [0, 1], target=target) == [("REFUSED", words)]
+
+
+def test_a_worker_does_job_after_job_whatever_becomes_of_one(monkeypatch):
+    spec = b'{"2": "shout", "3": "refuse", "4": "leave"}'
+    jobs = [[7, 1, 5, "row"], *([1, k] for k in (2, 3, 4)), [8, 6]]
+    assert served(monkeypatch, spec, *jobs) == [
+        ("READY", b"abc"),
+        ("BEAT", b""), ("DONE", b"7/1/5"),
+        ("BEAT", b""), ("RAISED", b"ValueError: no mirror at all"),
+        ("BEAT", b""), ("RAISED", b"row 3: no mission"),
+        ("BEAT", b""), ("RAISED", b"SystemExit: enough"),
+        ("BEAT", b""), ("DONE", b"8/6/-1"),
+    ]  # fmt: skip
+
+
+def test_a_process_is_heard_by_each_message_and_its_signs_of_life_stay_with_it():
+    stream, inbox = io.BytesIO(), []
+    for kind, body in [(Kind.READY, b"code"), (Kind.BEAT, b""), (Kind.DONE, b"\x00"), (Kind.RAISED, b"why")]:
+        write_message(stream, Message(kind, body))
+    stream.write(b"\x05cut")
+    stream.seek(0)
+    seconds = iter([3.0, 5.0, 7.0, 9.0])
+    process = a_worker(begun=False)
+    process.process.stdout = stream
+    process._clock, process._inbox = SimpleNamespace(now=lambda: next(seconds)), SimpleNamespace(put=inbox.append)
+    process._listen()
+    assert [(each is process, said and (said.kind.name, said.body)) for each, said in inbox] == [
+        (True, ("READY", b"code")), (True, ("DONE", b"\x00")), (True, ("RAISED", b"why")), (True, None)
+    ]  # fmt: skip
+    assert (process.begun, process.heard_s, stream.closed) == (True, 9.0, True)
+    process.process.stderr = io.BytesIO(b"first \n\n  caf\xe9\r\nlast")
+    process._keep_lines()
+    assert process._lines == ["first", "", "  caf\ufffd", "last"]
+
+
+def test_a_job_begins_unheard_and_one_whose_process_has_ended_is_sent_all_the_same():
+    process = a_worker(begun=True, heard_s=1.0)
+    process.process.stdin, process._clock = io.BytesIO(), SimpleNamespace(now=lambda: 33.0)
+    process.open(b"spec")
+    process.begin(Job(1, 2, 3, "trace"))
+    process.process.stdin.seek(0)
+    opened, job = read_message(process.process.stdin), read_message(process.process.stdin)
+    assert (opened, job.kind, json.loads(job.body)) == ((Kind.OPEN, b"spec"), Kind.JOB, [1, 2, 3, "trace"])
+    assert (process.job, process.begun, process.heard_s) == (Job(1, 2, 3, "trace"), False, 33.0)
+
+    def broken(data):
+        raise BrokenPipeError
+
+    process.process.stdin = SimpleNamespace(write=broken)
+    process.begin(Job(4, 5))
+    assert process.job == Job(4, 5)
+
+
+def test_what_an_engine_ended_with_is_told_with_the_count_and_the_last_words():
+    process = a_worker(Job(0, 1), ready=False, code=3)
+    process._lines = ["a", "ImportError: no numpy"]
+    engine = an_engine(process, processes=1)
+    engine._deaths, engine._false_starts = 4, 2
+    with pytest.raises(CampaignError) as told:
+        list(engine._lost(process, Queue(), "died"))
+    assert str(told.value) == (
+        "worker processes ended 5 times without a job done between; the last ended with exit code 3; its last words: "
+        "a / ImportError: no numpy"
+    )
+
+
+def test_other_loggers_and_levels_are_left_by_what_silences_the_cluster():
+    names = ["distributed.test", "distributed.test.core", "undistributed", "dask.distributed"]
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logging.DEBUG, logging.ERROR, logging.INFO, logging.WARNING]
+    for logger, level in zip(loggers, levels, strict=True):
+        logger.setLevel(level)
+    undo = cluster._quiet()
+    assert [logger.level for logger in loggers] == [51, 51, *levels[2:]]
+    undo()
+    assert [logger.level for logger in loggers] == levels

@@ -2,6 +2,8 @@
 
 import csv
 import hashlib
+import io
+import math
 import os
 import random
 import subprocess
@@ -413,3 +415,77 @@ def test_where_no_table_can_be_written_is_told_in_full(tmp_path, name, words):
         assert said(export.export_rows, book, path) == f"{path}: {words.format(folder=path.parent)}"
         none = said(export.export_rows, book, tmp_path / "a.csv")
     assert none == f"{tmp_path / 'a.ledger'} has no rows yet: run or resume the campaign first"
+
+
+# ------------------------------------------------------------------------------------------------- one part by itself
+def test_numbers_that_are_none_and_texts_with_anything_are_written_as_they_are(tmp_path):
+    """Of two cells, the second of which has another key; a reason of the second chunk's alone."""
+    texts = {"mirror": "a,b\n=c", "at": "\0x"}, {"mirror": "", "other/key": "@d"}
+    columns = {
+        "row": np.array([7.0, 8.0, 9.0]), "weight": np.array([0.1, 2.0, 1e300]),
+        "link/power": np.array([-0.0, math.inf, 5e-324]), "margin": np.array([math.nan, -math.inf, 622.08e6]),
+    }  # fmt: skip
+    fields = export._fields(head(texts))
+    assert [(f.name, f.unit, f.kind) for f in fields] == [
+        ("cell", "", "int"), ("mirror", "", "text"), ("at", "", "text"), ("other/key", "", "text"),
+        ("row", "", "int"), ("weight", "", "float"), ("link/power", "W", "float"), ("margin", "dB", "float"),
+        ("failed", "", "text"),
+    ]  # fmt: skip
+    assert [f.meaning for f in fields][:4] == [
+        "number of the combination of the grid", "mirror in the grid", "at in the grid", "other/key in the grid"
+    ]  # fmt: skip
+    lost = Failed(8, 1, 2, ""), Failed(9, 1, 2, "+1\0 \ud800")
+    made = export._block(Chunk(4, 2, columns, lost, np.zeros(0), np.zeros(0)), texts[0] | {"other/key": "k"}, fields)
+    written = {f.name: export._csv_texts(f, made[f.name]) for f in fields}
+    assert written == {
+        "cell": ["4"] * 3, "mirror": ["a,b\n=c"] * 3, "at": ["\\0x"] * 3, "other/key": ["k"] * 3,
+        "row": ["7", "8", "9"], "weight": ["0.1", "2.0", "1e+300"], "link/power": ["-0.0", "inf", "5e-324"],
+        "margin": ["nan", "-inf", "622080000.0"], "failed": ["", "without a reason", "'+1\\0 \\ud800"],
+    }  # fmt: skip
+    assert (export._name("a/b/c"), export._characters_of("a/b")) == ("a|b|c", "a|b characters")
+    letters = export._characters(np.array(["µ", "", "abc"], dtype=object), 3)
+    assert letters.tolist() == [[b"\xc2", b"\xb5", b""], [b"", b"", b""], [b"a", b"b", b"c"]]
+
+
+def test_a_disk_keeps_its_first_error_and_all_that_it_had_room_for(tmp_path, monkeypatch):
+    class Small(io.FileIO):
+        """Takes five bytes at a time, and fourteen in all."""
+
+        def write(self, data):
+            if self.tell() >= 14:
+                raise OSError(28, f"full at {self.tell()}")
+            return super().write(bytes(data)[: min(5, 14 - self.tell())])
+
+        def truncate(self, size=None):
+            raise OSError(28, "no length")
+
+    class Disk(export._Disk, Small):
+        pass
+
+    with Disk(tmp_path / "x", "x+") as disk:
+        assert (disk.write(b"0123456789"), disk.error, disk.tell()) == (10, None, 10)
+        assert (disk.write(np.arange(2, dtype="<f8")), disk.tell()) == (16, 26)
+        first = disk.error
+        assert "full at 14" in str(first)
+        assert (disk.write(b"ab"), disk.tell(), disk.error is first) == (2, 28, True)
+        assert (disk.truncate(40), disk.truncate(), disk.error is first) == (40, 28, True)
+        data = bytearray(b"x" * 8)
+        disk.seek(10)
+        assert (disk.readinto(data), bytes(data)) == (8, bytes(8))
+        disk.seek(8)
+        assert (disk.readinto(memoryview(data)), bytes(data)) == (8, b"89" + bytes(6))
+    with export._Disk(tmp_path / "y", "x+") as whole:
+        data = bytearray(b"x" * 3)
+        assert (whole.write(b"01"), whole.truncate(3), whole.seek(0), whole.readinto(data)) == (2, 3, 0, 3)
+        assert (bytes(data), whole.error) == (b"01\0", None)
+
+
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error"), RuntimeError("disk full")])
+def test_a_table_that_cannot_be_written_is_told_by_its_path_and_reason(tmp_path, error):
+    target = tmp_path / "rows.csv"
+    with pytest.raises(CampaignError) as told, export._whole_file(target):
+        raise error
+    reason = str(told.value.__cause__)
+    assert reason.startswith(str(error))
+    assert str(told.value) == f"{target} could not be written ({reason}), so nothing is: free space, or choose another"
+    assert list(tmp_path.iterdir()) == []

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import json
 import os
+import platform
 import random
 import re
 import sqlite3
@@ -982,3 +983,169 @@ def test_every_fault_of_the_small_things_in_a_ledger_is_named(path):
     with Ledger.open(path, write=False) as book:
         assert book.done() == {(0, 2)} and [each.row for each in book.traces()] == [TRACE.row]
         assert book.head == HEAD
+
+
+# ------------------------------------------------------------------------------------------ several cells and outputs
+def trace_of(cell, row, output, value):
+    """A trace whose numbers are all unlike each other."""
+    numbers = np.random.default_rng([cell, row])
+    return WorstTrace(cell, row, output, value, np.arange(4.0) + row, numbers.random((4, 2)), numbers.random((4, 3)))
+
+
+def test_traces_are_told_apart_by_cell_row_and_output(path):
+    kept = [(1, 2, "margin"), (0, 9, "residual"), (0, 9, "margin"), (0, 2, "margin"), (1, 9, "margin")]
+    with Ledger.create(path, HEAD) as ledger:
+        for k, each in enumerate(kept):
+            ledger.put_trace(trace_of(*each, float(k)))
+        assert [(t.cell, t.output, t.row, t.value) for t in ledger.traces()] == [
+            (0, "margin", 2, 3.0), (0, "margin", 9, 2.0), (0, "residual", 9, 1.0), (1, "margin", 2, 0.0),
+            (1, "margin", 9, 4.0),
+        ]  # fmt: skip
+        (second,) = [t for t in ledger.traces() if (t.cell, t.row) == (1, 9)]
+        wanted = trace_of(1, 9, "margin", 4.0)
+        assert all(same_bits(getattr(second, n), getattr(wanted, n)) for n in ("time_s", "error_rad", "drive_v"))
+        ledger.drop_trace(trace_of(0, 9, "margin", 7.0))
+        assert {(t.cell, t.row, t.output) for t in ledger.traces()} == {*kept} - {(0, 9, "margin")}
+        ledger.drop_trace(trace_of(1, 9, "residual", 7.0))  # there is none
+        assert len(ledger.traces()) == 4
+
+
+def test_what_came_in_behind_a_mark_comes_in_its_order_with_its_own_mark(path):
+    came = [(1, 3), (0, 5), (1, 0), (0, 2)]
+    with Ledger.create(path, HEAD) as ledger:
+        for cell, number in came:
+            ledger.put(cell, number, packed(number, cell))
+        ledger.put(1, 3, packed(3, 1))  # is in already
+        whole = list(ledger.added(0))
+        assert [(at, each.cell, each.number) for at, each in whole] == [(k + 1, *each) for k, each in enumerate(came)]
+        assert [(each.cell, each.number) for _, each in ledger.added(2)] == came[2:]
+        assert (list(ledger.added(4)), ledger.count()) == ([], 4)
+        assert [each.number for each in ledger.chunks(1)] == [0, 3]
+    flip(path, path.read_bytes().index(packed(0, 1)[-600:-500]), 5)
+    with Ledger.open(path, write=False) as ledger:
+        found = ledger.added(1)
+        assert (next(found)[1].cell, "chunk 0 of cell 1 is damaged" in said(next, found)) == (0, True)
+    assert verify(path, [(1, 7), (0, 1), (1, 0)]).missing == ((0, 1), (1, 7))
+    assert verify(path).damaged == ((1, 0),)
+    mend(path)
+    with Ledger.open(path, write=False) as ledger:
+        kept = [(1, 1, 3), (2, 0, 5), (4, 0, 2)]  # with their marks
+        assert [(at, each.cell, each.number) for at, each in ledger.added(0)] == kept
+
+
+@pytest.mark.parametrize(
+    ("code", "text", "what", "remedy"),
+    [
+        (sqlite3.SQLITE_FULL, "x", "the disk is full", "Free space"),
+        (
+            sqlite3.SQLITE_IOERR_WRITE,
+            "x",
+            "the disk does not take or give the data (x)",
+            "Check the disk and its space",
+        ),
+        (sqlite3.SQLITE_READONLY_DIRECTORY, "a", "a", "Make file and folder writable"),
+        (sqlite3.SQLITE_CANTOPEN, "b", "b", "Make file and folder readable and writable"),
+        (sqlite3.SQLITE_PERM, "c", "c", "Make file and folder readable and writable"),
+        (sqlite3.SQLITE_BUSY_SNAPSHOT, "d", "another program held the file for longer than 30 s", "Close that program"),
+        (sqlite3.SQLITE_NOMEM, "out of memory", "out of memory", "See to that"),
+    ],
+)
+def test_each_error_of_sqlite_says_what_is_in_and_what_to_do(path, code, text, what, remedy):
+    filled(path, 2)
+    error = sqlite3.OperationalError(text)
+    error.sqlite_errorcode = code
+
+    def told(where):
+        with file.errors_in_words(where, "keep chunk 7 of cell 1"):
+            raise error
+
+    none, safe = path.with_name("none"), "3 chunks are in and stay; only what was being written is lost. "
+    for where, typed, counted in ((path, f"'{path}'", safe), (none, f"{none}", "")):
+        assert said(told, where) == (
+            f"{where}: microrad could not keep chunk 7 of cell 1: {what}. {counted}{remedy}, then go on with `microrad "
+            f"campaign resume {typed}`"
+        )
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (OSError(28, "No space left on device"), "No space left on device"),
+        (OSError("odd"), "odd"),
+        (
+            UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad"),
+            "the file is damaged (a text in it is none). `microrad campaign resume x.ledger` goes on with what can be "
+            "read of it; where nothing can, begin the campaign anew in another file",
+        ),
+    ],
+)
+def test_errors_of_the_system_and_of_texts_are_told_in_words(error, words):
+    def fail():
+        with file.errors_in_words(Path("x.ledger"), "read the notes"):
+            raise error
+
+    assert said(fail) == f"x.ledger: microrad could not read the notes: {words}"
+
+
+@pytest.mark.parametrize("name", ["plain.ledger", "a b.ledger", "it's.ledger"])
+def test_what_is_to_be_typed_has_the_path_in_quotes_where_it_needs_them(tmp_path, name):
+    path = tmp_path / name
+    typed = {"plain.ledger": f"{path}", "a b.ledger": f"'{path}'", "it's.ledger": f"'{tmp_path}/it'\"'\"'s.ledger'"}[
+        name
+    ]
+    filled(path, 1)
+    assert said(refuse_existing, path) == (
+        f"there is already {path}: go on with `microrad campaign resume {typed}`, or name another with --ledger"
+    )
+    with Ledger.open(path, write=True) as ledger:
+        busy = said(Ledger.open, path, write=True)
+        since = ledger.notes()["writer"]["since"]
+    assert busy == (
+        f"process {os.getpid()} on {platform.node()}, since {since}, already writes to {path}: wait for it or stop it; "
+        f"how far it is says `microrad campaign status {typed}`"
+    )
+    flip(path, path.read_bytes().index(packed(0)[-600:-500]), 5)
+    with Ledger.open(path, write=False) as ledger:
+        assert said(ledger.get, 0, 0) == (
+            f"{path}: chunk 0 of cell 0 is damaged, its checksum differs; `microrad campaign resume {typed}` does it "
+            "again"
+        )
+    file_there, folder = tmp_path / "c d.toml", tmp_path / "folder.ledger"
+    file_there.write_text("seed = 1\n")
+    folder.mkdir()
+    assert said(file.refuse_foreign, file_there) == (
+        f"{file_there} is no ledger, or its first page is damaged: begin it with `microrad campaign run "
+        f"'{file_there}'`, or name the file that this wrote"
+    )
+    assert said(file.refuse_foreign, folder) == (
+        f"{folder} is a folder, not a ledger: name the file that `microrad campaign run` wrote"
+    )
+    for taken in (file_there, folder):
+        assert said(refuse_existing, taken) == (
+            f"there is already {taken}, which is no ledger, and it stays: name another with --ledger"
+        )
+
+
+def test_damage_to_a_trace_and_a_note_of_the_second_cell_is_named_by_its_keys(path):
+    with Ledger.create(path, HEAD) as ledger:
+        for each in ((0, 3, "margin"), (1, 17, "residual")):
+            ledger.put_trace(trace_of(*each, 1.0))
+        ledger.note("second", "twice upon a time")
+        ledger.note("first", 1)
+    with contextlib.closing(sqlite3.connect(path)) as other, other:
+        other.execute("UPDATE traces SET output = 'margin' WHERE cell = 1")
+        other.execute("UPDATE notes SET value = '\"thrice\"' WHERE key = 'second'")
+        other.execute("DELETE FROM head_again")
+    found = verify(path)
+    assert (found.checked, found.damaged, found.missing, found.sound) == (0, (), (), False)
+    assert found.faults == (
+        "copy 2 of the head: this is no head of microrad: do its chunk again",
+        "damaged among the traces: (1, 17, 'margin')",
+        "damaged among the notes: ('second',)",
+    )
+    with Ledger.open(path, write=False) as ledger:
+        assert (ledger.head, {k for k in ledger.notes() if k != "writer"}) == (HEAD, {"first"})
+    mend(path)
+    with Ledger.open(path, write=False) as ledger:
+        assert [(t.cell, t.row, t.output) for t in ledger.traces()] == [(0, 3, "margin")]
+    assert verify(path).sound

@@ -1,5 +1,6 @@
 """Optimisation under a probability constraint: against closed forms, known optima, and what it must not claim."""
 
+import itertools
 import math
 import os
 import re
@@ -1017,7 +1018,7 @@ def test_a_variable_has_its_unit_and_the_range_it_was_searched_in():
 
 
 RATE = Limit("data_rate", None, 622.08e6, "test")
-BOTH = Limit("residual_rms", 2.5e-6, 12.5e-6, "test")
+RESIDUAL = Limit("residual_rms", 2.5e-6, 12.5e-6, "test")
 
 
 def kept(excess, share=0.5, limit=MARGIN, high=1.0):
@@ -1025,7 +1026,7 @@ def kept(excess, share=0.5, limit=MARGIN, high=1.0):
 
 
 def test_a_limit_in_words_has_each_side_in_its_unit():
-    said = [kept(0.0, limit=limit).wanted for limit in (MARGIN, RATE, BOTH, Limit("outage", None, 0.0125, ""))]
+    said = [kept(0.0, limit=limit).wanted for limit in (MARGIN, RATE, RESIDUAL, Limit("outage", None, 0.0125, ""))]
     assert said == [
         "margin >= 3 dB",
         "data_rate <= 622.1 Mbit/s",
@@ -1285,3 +1286,153 @@ def test_a_file_without_an_optimisation_is_refused_by_its_name(monkeypatch):
     with pytest.raises(CampaignError) as error:
         optimisation_campaign.optimise_campaign("a b.toml")
     assert str(error.value) == "a b.toml: there is no table [optimise] in it, so nothing says what to optimise"
+
+
+# ------------------------------------------------------------------------------ several variables and limits, unlike
+POWER_W, ANGLE = Variable("power", "W", 0.5, 4.0), Variable("angle", "rad", 1e-6, 9e-5)
+RESIDUAL, RESIDUAL = Limit("residual_quantile", None, 1e-5, ""), Limit("margin", 3.0, 9.5, "")
+
+
+def two_variables(**changes):
+    given = {"variables": (POWER_W, ANGLE), "minimise": "power", "limits": (RESIDUAL, RESIDUAL), "confidence": 0.8}
+    return problem(**given | changes)
+
+
+def test_each_limit_is_judged_by_its_own_output_side_and_weights():
+    columns = {
+        "weight": np.array([0.5, 2.0, 1.0, 0.25, 1.25]),
+        "margin": np.array([4.0, 9.25, 2.5, 10.5, 5.0]),
+        "residual_quantile": np.array([9e-6, 1.5e-5, 4e-6, np.inf, 8e-6]),
+        "data_rate": np.array([1.0, 2.0, 4.0, np.nan, 8.0]),
+    }
+    found = judged(two_variables(minimise="-data_rate"), {"power": 2.0, "angle": 5e-5}, columns)
+    assert found.cost == pytest.approx((0.5 + 4.0 + 4.0 + 10.0) / 4.75)  # but for the row without one
+    margin, residual = found.kept
+    assert (margin.value, margin.excess) == (2.5, -0.5)  # 10.5 is a twentieth and may miss it, 2.5 with it may not
+    assert (residual.value, residual.excess) == pytest.approx((1.5e-5, -5e-6))
+    assert (margin.share.value, residual.share.value) == pytest.approx((0.75, 0.55))
+    assert [k.limit for k in found.kept] == [RESIDUAL, RESIDUAL] and not found.feasible
+    assert margin.wanted == "margin >= 3 dB and <= 9.5 dB"
+    assert judged(two_variables(minimise="-angle"), {"power": 2.0, "angle": 5e-5}, columns).cost == 5e-5
+    with pytest.raises(CampaignError) as told:
+        judged(two_variables(minimise="volume"), {"power": 2.0}, columns)
+    assert str(told.value) == "the rows have no output volume, which the optimisation needs; add it to keep"
+
+
+def kept_of(asked, *excess):
+    values = (3.0, 1e-5)
+    share = Interval(0.91, 0.8, 0.95, 0.95), Interval(0.234, 0.2, 0.3, 0.95)
+    of = zip(asked.limits, values, excess, share, strict=True)
+    return tuple(Kept(limit, value + each, each, one) for limit, value, each, one in of)
+
+
+def two_search(asked, *candidates):
+    """A search that knows these candidates: two numbers of the unit square, cost, excesses."""
+    made = search._Search(asked, never, quiet, cost_scale=2.0, scales=np.array([4.0, 5e-6]))
+    for number, (place, cost, *excess) in enumerate(candidates):
+        values = {v.key: v.at(x) for v, x in zip(asked.variables, place, strict=True)}
+        kept, refused = (kept_of(asked, *excess), "") if excess else ((), f"no mission {number}")
+        made.known[bytes([number])] = np.array(place), Candidate(values, cost, kept, refused)
+    return made
+
+
+def test_a_search_is_told_of_all_limits_by_their_scales_and_of_a_refused_place_by_its_neighbour():
+    made = two_search(
+        two_variables(), ((0.1, 0.2), 7.0, 1.0, -2e-6), ((0.9, 0.7), 3.0, -2.0, 4e-6), ((0.9, 0.3), math.nan)
+    )
+    known = list(made.known.values())
+    made.at = lambda place: next(c for p, c in known if p.tolist() == place.tolist())
+    here = search.HEADROOM
+    np.testing.assert_allclose(made._numbers(np.array([0.1, 0.2])), [3.5, 0.25 - here, -0.4 - here], atol=1e-9)
+    np.testing.assert_allclose(made._numbers(np.array([0.9, 0.7])), [1.5, -0.5 - here, 0.8 - here], atol=1e-9)
+    refused = [1.5 + 10.0 * 0.4, -0.5 - here - 0.4, 0.8 - here - 0.4]
+    np.testing.assert_allclose(made._numbers(np.array([0.9, 0.3])), refused, atol=1e-9)
+    most = two_search(two_variables(minimise="-power"), ((0.1, 0.2), 7.0, 1.0, -2e-6))
+    assert most.cost(most.trace[0]) == -3.5
+    assert search._distance(np.array([0.1, 0.2]), np.array([0.4, 0.6])) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("candidates", "minimise", "words"),
+    [
+        ([], "power", "no candidate keeps the limits yet"),
+        ([((0.1, 0.2), 1.25, -1.0, 1e-6)], "power", "no candidate keeps the limits yet"),
+        ([((0.1, 0.2), 1.25, 1.0, 1e-6), ((0.3, 0.2), 2.5, 1.0, 1e-6)], "power", "best power 1.25 W"),
+        ([((0.1, 0.2), 1.25, 1.0, 1e-6), ((0.3, 0.2), 2.5, 1.0, 1e-6)], "-power", "best power 2.5 W"),
+        ([((0.1, 0.2), 3.5e-5, 0.0, 0.0)], "angle", "best angle 35 µrad"),
+        ([((0.1, 0.2), 6.2208e8, 1.0, 1e-6)], "-data_rate", "best data_rate 622.1 Mbit/s"),
+    ],
+)
+def test_the_best_so_far_is_told_with_its_unit(candidates, minimise, words):
+    assert two_search(two_variables(minimise=minimise), *candidates)._so_far() == words
+
+
+@pytest.mark.parametrize(
+    ("excess", "reason"),
+    [
+        ((0.0, 0.0), ""),
+        ((1.0, -1e-9), "residual_quantile <= 10 µrad in 80 % of rows; the best has 23.4 %"),
+        ((-1e-9, 1.0), "margin >= 3 dB and <= 9.5 dB in 80 % of rows; the best has 91 %"),
+        (
+            (-1.0, -1.0),
+            "margin >= 3 dB and <= 9.5 dB and residual_quantile <= 10 µrad in 80 % of rows; the best has 91 % and "
+            "23.4 %",
+        ),
+    ],
+)
+def test_why_there_is_no_optimum_names_each_limit_that_is_missed(excess, reason):
+    asked = two_variables()
+    best = Candidate({}, 1.0, kept_of(asked, *excess))
+    assert search._reason(asked, best, []) == (f"no candidate keeps {reason}" if reason else "")
+    refused = [Candidate({}, math.nan, (), f"it is {k}") for k in range(3)]
+    assert search._reason(asked, None, refused) == (
+        "no candidate is a mission: all 3 were refused, the last because it is 2"
+    )
+
+
+def test_what_binds_is_named_of_the_second_limit_and_variable_too():
+    near = ((0.5, 0.985), 1.0, 0.5, 0.9e-7)
+    far = ((0.2, 0.3), 2.0, 0.5, -1e-6)
+    made = two_search(two_variables(), far, ((0.0, 0.0), math.nan), near)
+    assert search._bound_by(made, made.best()) == ("residual_quantile", "angle at its high")
+    other = two_search(two_variables(), ((0.01, 0.5), 1.0, 0.07, 4e-6), ((0.3, 0.4), 0.1, -1.0, 1e-6))
+    assert search._bound_by(other, other.best()) == ("margin", "power at its low")
+
+
+def test_candidates_are_drawn_in_parts_with_their_values_by_key_from_any_row_on(monkeypatch):
+    from microrad.campaign.optimisation import campaign as optimisation
+
+    made, asked = [], []
+
+    class Rows:
+        def __init__(self, campaign, controllers, values, memory):
+            made.append((controllers, values, memory))
+
+        def rows(self, cell, rows, beat):
+            asked.append((cell, rows.start, rows.stop))
+            row = np.arange(rows.start, rows.stop, dtype=float)
+            return SimpleNamespace(columns={"row": row, "weight": row + 0.5, "margin": -row, "outage": row * 2.0})
+
+    monkeypatch.setattr(optimisation, "Evaluator", Rows)
+    monkeypatch.setattr(optimisation, "touches_loop", lambda key, mission: key == "angle")
+    monkeypatch.setattr(optimisation, "ControllerTuner", lambda of: SimpleNamespace(tuned=lambda *given: given))
+    outputs = [SimpleNamespace(name=name) for name in ("margin", "outage")]
+    table, mission = SimpleNamespace(loop=object()), SimpleNamespace(mission=None)
+    campaign = SimpleNamespace(variables=(POWER_W, ANGLE), outputs=outputs, table=table, mission=mission)
+    rows = optimisation._CandidateRows(campaign, 21, 1)
+    found = rows.columns(np.array([2.5, 3e-5]), first=100)
+    values = {"power": 2.5, "angle": 3e-5}
+    assert made == [({0: (0, values)}, values, None)]
+    starts = [100, 102, 105, 107, 110, 113, 115, 118, 121]
+    assert sorted(asked) == [(0, a, b) for a, b in itertools.pairwise(starts)]
+    assert list(found) == ["weight", "margin", "outage"]
+    np.testing.assert_array_equal(found["margin"], -np.arange(100.0, 121.0))
+    np.testing.assert_array_equal(found["weight"], np.arange(100.5, 121.5))
+    few = optimisation._CandidateRows(SimpleNamespace(**{**vars(campaign), "variables": (POWER_W,)}), 3, 1)
+    few.campaign.table.loop = None
+    asked.clear()
+    few.columns(np.array([1.0]))
+    few.columns(np.array([2.0]))
+    assert sorted(asked) == [(0, k, k + 1) for k in (0, 0, 1, 1, 2, 2)]
+    assert [each[:2] for each in made[1:]] == [({}, {"power": 1.0}), ({}, {"power": 2.0})]
+    assert made[1][2] is made[2][2] is not None, "what moves no loop shares its runs"

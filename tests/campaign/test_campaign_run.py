@@ -28,7 +28,7 @@ from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger, argument, chunk_format, mending
 from microrad.campaign.ledger.file import is_written
 from microrad.campaign.records import CampaignError, Outcome
-from microrad.campaign.rows import evaluate, evaluator
+from microrad.campaign.rows import evaluate, evaluator, loops
 from microrad.campaign.rows import evaluator as rows_evaluator
 from microrad.campaign.rows import plan as rows_plan
 from microrad.campaign.rows.evaluator import Evaluator
@@ -1174,3 +1174,305 @@ def test_what_is_told_of_a_campaign_that_stops_is_how_to_go_on(monkeypatch):
     made.book, made.pace.done = SimpleNamespace(path=Path("a folder") / "b.ledger"), 12
     path = Path("a folder") / "b.ledger"
     assert made._stopped() == f"12 rows are in {path}. Go on with: microrad campaign resume {argument(path)}"
+
+
+def test_runs_of_consecutive_rows_are_told_apart_by_row():
+    picked = []
+    runs = SimpleNamespace(part=lambda first, count: picked.append((first, count)))
+    for row in (40, 41, 43):
+        evaluator.Simulated(40, 3, runs).row(row)
+    assert picked == [(0, 3), (3, 3), (9, 3)]
+    weighted = evaluator._Weighted(40, np.array([1.5, 2.5, 4.5]), np.array([-0.25, 0.75, -3.0]))
+    assert weighted.row(42) == {"tail_radius": 4.5, "tail_log_weight": -3.0}
+    assert weighted.row(40) == {"tail_radius": 1.5, "tail_log_weight": -0.25}
+
+
+@pytest.mark.parametrize(("tail", "memory"), [(False, False), (False, True), (True, False)])
+def test_rows_have_the_runs_of_their_own_numbers(monkeypatch, tail, memory):
+    """Of the rows 103 and 104 of a chunk that begins at 100, the first of which is no mission."""
+    asked, lanes = [], kernels.LANES
+    made = object.__new__(Evaluator)
+    wanted = SimpleNamespace(error_rad=7e-6) if tail else None
+    table = SimpleNamespace(loop="loop", tail=wanted, seed=3)
+    made.campaign, made.memory = SimpleNamespace(table=table, realisations=5), {} if memory else None
+    made.controller, made._proposal = (lambda cell: f"controller {cell}"), lambda cell: f"proposal {cell}"
+    own = SimpleNamespace(row="flown", span="span")
+    monkeypatch.setattr(evaluator, "mission_loop", lambda *given: asked.append(given) or own)
+    monkeypatch.setattr(evaluator, "LinkFile", str)
+
+    def simulate(row, controller, span, count, **given):
+        asked.append((row, controller, span, count, given["first_run"], given["threads"], given["beat"]))
+        return "runs"
+
+    def weighted(row, controller, span, by, first, beat):
+        asked.append((row, controller, span, by, first, beat))
+        return np.arange(lanes) + float(first), -np.arange(lanes) - float(first)
+
+    monkeypatch.setattr(evaluator.ensemble, "simulate", simulate)
+    monkeypatch.setattr(evaluator.importance_sampling, "runs", weighted)
+    rows = lanes + 2 if tail else 2
+    files = ["f0", "f1", "f2", None, "f4", *["f"] * rows]
+    mirrors, keys = [f"m{k}" for k in range(len(files))], [f"k{k}" for k in range(len(files))]
+    drawn = evaluator._Rows(2, 100, {}, np.ones(len(files)), files, mirrors, keys)
+    found = made._simulated(drawn, range(3, 3 + rows), "watch")
+    loop = ("f4", "loop", 3, "m3")
+    if tail:
+        flown = ("flown", "controller 2", "span", "proposal 2")
+        assert asked == [loop, (*flown, 103, "watch"), (*flown, 103 + lanes, "watch")]
+        assert (found.first_row, found.radius_rad.size, found.log_weight.size) == (103, rows, rows)
+        assert found.row(103 + rows - 1) == {"tail_radius": 103.0 + lanes + 1, "tail_log_weight": -(103.0 + lanes + 1)}
+        return
+    assert found == evaluator.Simulated(103, 5, "runs")
+    assert asked == [loop, ("flown", "controller 2", "span", 10, 515, 1, "watch")]
+    again = made._simulated(drawn, range(3, 5), "watch")
+    assert (again is found) is memory and len(asked) == (2 if memory else 4)
+    made._simulated(drawn, range(3, 4), "watch")
+    assert len(asked) == (2 if memory else 4), "the rows of a group without a mission are not simulated"
+    made.campaign.table.loop = None
+    assert made._simulated(drawn, range(4, 5), "watch") is None
+
+
+def test_a_trace_is_of_the_rows_first_run_once_it_has_settled(monkeypatch):
+    made, asked = object.__new__(Evaluator), []
+    made.campaign = SimpleNamespace(realisations=4)
+    made.controller = lambda cell: f"controller {cell}"
+    made._drawn = lambda cell, rows: SimpleNamespace(files=[rows.start], mirrors=["mirror"])
+    own = SimpleNamespace(row="flown", span=SimpleNamespace(settle_s=0.5))
+    made._loop = lambda file, mirror: asked.append((file, mirror)) or own
+    times, numbers = np.array([0.0, 0.25, 0.5, 0.75]), np.arange(8.0).reshape(4, 2)
+    whole = SimpleNamespace(time_s=times, error_rad=numbers, drive_v=-numbers)
+    monkeypatch.setattr(evaluator.traces, "trace", lambda *given: asked.append(given) or whole)
+    found = made.trace(2, 9, lambda: asked.append("beat"))
+    assert asked == ["beat", (9, "mirror"), ("flown", "controller 2", own.span, 36)]
+    assert (found.cell, found.row, found.output, np.isnan(found.value)) == (2, 9, "", True)
+    assert (found.time_s.tolist(), found.error_rad.tolist()) == ([0.5, 0.75], [[4.0, 5.0], [6.0, 7.0]])
+    assert found.drive_v.tolist() == [[-4.0, -5.0], [-6.0, -7.0]]
+
+
+def test_the_first_lost_number_is_told_of_all_outputs_that_have_none():
+    made = an_evaluator(lambda *given: ({"a": 1.0, "b": np.inf, "c": np.nan, "d": -np.inf}, None), lambda *given: None)
+    made.names = ("a", "b", "c", "d")
+    found = made.rows(0, range(10, 15), lambda: None, attempts=3)
+    assert {each.reason for each in found.failed} == {"gives inf for b, c, d"}
+    assert {each.attempts for each in found.failed} == {3} and np.isnan(found.columns["a"]).all()
+
+
+def test_each_share_of_a_residual_is_of_its_own_count():
+    names = ("COUNT_LOST", "COUNT_SATURATED", "COUNT_CLAMPED", "COUNT_OUTSIDE")
+    counters = {getattr(kernels, name): 10.0 + k for k, name in enumerate(names)}
+    runs = SimpleNamespace(
+        radial_rms_rad=1.5, largest_rad=np.array([2.0, 7.0, 3.0]), beyond=lambda limit: 100.0 * limit,
+        quantile_rad=lambda share: 5.0 * share, share=counters.get,
+    )  # fmt: skip
+    required, table = SimpleNamespace(pointing_error_rad=0.25), SimpleNamespace(quantile=0.75)
+    whole = evaluate.controller_study.table
+    assert whole(table) is table
+    found = {name: of() for name, of in evaluate._residual(required, table, runs).items()}
+    assert found == {
+        "residual_rms": 1.5, "residual_quantile": 3.75, "residual_largest": 7.0, "beyond_share": 25.0,
+        "lost_share": 10.0, "saturated_share": 11.0, "beyond_rate_share": 12.0, "outside_share": 13.0,
+    }  # fmt: skip
+    counts = np.zeros((2, kernels.BINS), dtype=np.int32)
+    counts[0, [0, 2]], counts[1, [2, 5]] = [3, 1], [2, 4]
+    shares = evaluate.exceeded(SimpleNamespace(histogram=counts))
+    np.testing.assert_allclose(shares[:8], [1.0, 0.7, 0.7, 0.4, 0.4, 0.4, 0.0, 0.0], atol=1e-15)
+
+
+def test_light_that_cannot_be_is_refused_of_the_link_and_of_each_beam_by_name(monkeypatch):
+    data, impossible = SimpleNamespace(requirement="required"), SimpleNamespace(possible=False)
+    monkeypatch.setattr(evaluate.Exposure, "stated", lambda of: impossible)
+    monkeypatch.setattr(evaluate.Exposure, "of", lambda *given: SimpleNamespace(possible=True, given=given))
+    monkeypatch.setattr(evaluate, "stated_outage", lambda required: 0.125)
+    with pytest.raises(evaluate.link.LinkError, match=f"^{evaluate.IMPOSSIBLE}$"):
+        evaluate._exposure(data, None)
+    runs = SimpleNamespace(quantile_rad=lambda share: 8.0 * share, beyond="beyond", histogram=np.eye(3, kernels.BINS))
+    at, quantile, beyond, errors = evaluate._exposure(data, runs).given
+    assert (at is data, quantile, beyond, errors().share.sum()) == (True, 7.0, "beyond", pytest.approx(1.0))
+    monkeypatch.setattr(evaluate.link, "beam_budget", lambda *given: impossible)
+    beam = evaluate._Beam("answer", ("a table",), "shared", "beam", {})
+    with pytest.raises(evaluate.link.LinkError, match=f"^answer: {evaluate.IMPOSSIBLE}$"):
+        evaluate._beam_margin(beam)
+    monkeypatch.setattr(evaluate.link, "rate_at_loss", lambda of, margin, loss: 1e6 * margin - loss)
+    monkeypatch.setattr(data, "requirement", SimpleNamespace(margin_db=3.0))
+    assert evaluate._rate(data, 7.0) == 3e6 - 7.0
+
+
+# ---------------------------------------------------------------------------------------------- rounds of a campaign
+class Kept(dict):
+    """A ledger of chunks by cell and number that notes what is noted."""
+
+    path = Path("a b.ledger")
+
+    def __init__(self, *done):
+        super().__init__(dict.fromkeys(done, b""))
+        self.noted = {}
+
+    def done(self):
+        return set(self)
+
+    def note(self, key, value):
+        self.noted[key] = value
+
+    def put(self, cell, number, payload):
+        self[cell, number] = payload
+
+
+def rounds_of(book, outcomes, precise=(), rounds=(6, 10)):
+    """A runner of three cells with these rounds of rows in chunks of four, and what it tells."""
+    made, told = object.__new__(run._Runner), []
+    made.campaign = SimpleNamespace(cells=[0, 1, 2], limits=())
+    made.plan, made.book, made.pace, made.total = Plan(4, 4, rounds, False), book, run._Pace(8, 30.0), 0
+    made.engine = SimpleNamespace(outcomes=outcomes, close=lambda: told.append("closed"))
+    made.on_progress = lambda done, total, what: told.append((done, total))
+    made._precise = lambda cell, rows: (cell, rows) in precise
+    made._traces = lambda: told.append("traces")
+    return made, told
+
+
+def test_rounds_have_the_chunks_that_are_missing_of_the_cells_that_are_not_precise():
+    book, asked = Kept((0, 0), (2, 1)), []
+
+    def outcomes(jobs):
+        asked.append(list(jobs))
+        return (Outcome(job, "done", bytes([job.cell, job.number])) for job in asked[-1])
+
+    made, told = rounds_of(book, outcomes, precise={(0, 6), (1, 10)})
+    made.run()
+    assert [[(job.cell, job.number) for job in each] for each in asked] == [
+        [(0, 1), (1, 0), (1, 1), (2, 0)],
+        [(1, 2), (2, 2)],
+    ]
+    assert told == [(12, 24), (16, 24), (20, 24), (24, 24), (26, 28), (28, 28), "traces"]
+    assert book[1, 2] == b"\x01\x02" and book.noted["state"] == "complete" and book.noted["seconds"] >= 30.0
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "words", "state"),
+    [
+        (CampaignError("the disk is full"), CampaignError, "the disk is full; 8 rows are in", "stopped"),
+        (CampaignError("x: `microrad campaign resume x`"), CampaignError, "x: `microrad campaign resume x`", "stopped"),
+        (KeyboardInterrupt(), KeyboardInterrupt, "stopped; 8 rows are in", "running"),
+        (ZeroDivisionError("odd"), ZeroDivisionError, "odd", "stopped"),
+    ],
+)
+def test_a_stop_says_what_is_in_and_how_to_go_on_once(error, kind, words, state):
+    def outcomes(jobs):
+        raise error
+
+    book = Kept((0, 0))
+    made, told = rounds_of(book, outcomes)
+    with pytest.raises(kind) as caught:
+        made.run()
+    on = " a b.ledger. Go on with: microrad campaign resume 'a b.ledger'" if "rows are in" in words else ""
+    assert str(caught.value) == words + on
+    assert (book.noted["state"], told) == (state, ["closed"])
+
+
+@pytest.mark.parametrize(
+    ("cells", "rows", "took_s", "mean_s", "asked"),
+    [
+        (2, 3, 0.25, 0.25, [(0, 0), (1, 0), (0, 1), (1, 1), (0, 2), (1, 2)]),
+        (1, 1, 0.25, 0.25, [(0, 0), (0, 0)]),
+        (1, 9, 100.0, 100.0, [(0, 0), (0, 1)]),
+    ],
+)
+def test_a_row_is_timed_by_rows_of_all_cells_in_turn_but_for_the_first(monkeypatch, cells, rows, took_s, mean_s, asked):
+    done, now = [], [50.0]
+
+    def work(cell, of, beat, attempts):
+        assert (len(of), attempts) == (1, 1)
+        done.append((cell, of.start))
+        now[0] += took_s if len(done) > 1 else 1000.0
+
+    monkeypatch.setattr(run, "_TIMED_S", 30.0)
+    monkeypatch.setattr(run, "Evaluator", lambda campaign, controllers: SimpleNamespace(rows=work))
+    campaign = SimpleNamespace(cells=[0] * cells, rows=rows)
+    assert run.row_s(campaign, lambda: now[0]) == pytest.approx(mean_s)
+    assert done == asked
+
+
+def test_a_ledgers_head_has_the_units_and_meanings_of_all_columns(monkeypatch):
+    monkeypatch.setattr(run.bundle, "hashes", lambda campaign: {"code": "c0de"})
+    inputs = [SimpleNamespace(key="a.power", unit="W"), SimpleNamespace(key="b.angle", unit="rad")]
+    outputs = [
+        SimpleNamespace(name=n, unit=u, meaning=m) for n, u, m in (("margin", "dB", "left"), ("outage", "", "part"))
+    ]
+    campaign = SimpleNamespace(
+        path=Path("x/second.toml"), text="the text", mission=SimpleNamespace(mission=SimpleNamespace(name="a mission")),
+        table=SimpleNamespace(seed=41), cells=[SimpleNamespace(values={"k": "1"}), SimpleNamespace(values={"k": "2"})],
+        inputs=inputs, outputs=outputs,
+    )  # fmt: skip
+    head = run._head(campaign, b"spec")
+    assert [tuple(each) for each in head.columns] == [
+        ("row", "", "number of the row in its cell"), ("weight", "", "weight of the row"), ("a.power", "W", "drawn"),
+        ("b.angle", "rad", "drawn"), ("margin", "dB", "left"), ("outage", "", "part"),
+    ]  # fmt: skip
+    assert (head.campaign_name, head.campaign_text, head.mission_name) == ("second", "the text", "a mission")
+    assert (head.seed, head.hashes, head.cells, head.bundle) == (
+        41,
+        {"code": "c0de"},
+        ({"k": "1"}, {"k": "2"}),
+        b"spec",
+    )
+    assert head.versions["microrad"] == microrad.__version__ and set(head.versions) > {"numpy", "scipy"}
+
+
+def test_controllers_are_tuned_once_for_each_loop_by_the_values_that_it_has(monkeypatch):
+    tuned, told = [], []
+
+    def mission_loop(file, table, seed):
+        def tune():
+            if "bad" in file:
+                raise ValueError("no stable loop")
+            tuned.append((file, table, seed))
+            return f"tuned {file}"
+
+        return SimpleNamespace(tuned=tune)
+
+    builder = SimpleNamespace(
+        loop_key=lambda cell, values: (cell % 2, values.get("loop")), mission=lambda cell, values: f"{cell} {values}"
+    )
+    monkeypatch.setattr(loops, "MissionBuilder", lambda campaign: builder)
+    monkeypatch.setattr(loops, "mission_loop", mission_loop)
+    table = SimpleNamespace(controller="PI + notch", duration_s=None, settle_s=0.25)
+    campaign = SimpleNamespace(table=SimpleNamespace(loop=table, seed=41), cells=[0, 0, 0])
+    assert loops.controllers(campaign, lambda *each: told.append(each)) == ("tuned 0 {}", "tuned 1 {}", "tuned 0 {}")
+    assert told == [(k, 3, "tuning PI + notch") for k in range(3)]
+    assert tuned == [(f"{k} {{}}", table, 41) for k in range(2)]
+    tuner = loops.ControllerTuner(campaign)
+    made = [tuner.tuned(0, {"loop": 1.0, "link": 2.0}), tuner.tuned(0, {"loop": 1.0}), tuner.tuned(0, {"loop": 2.0})]
+    assert made == ["tuned 0 {'loop': 1.0, 'link': 2.0}"] * 2 + ["tuned 0 {'loop': 2.0}"]
+    with pytest.raises(CampaignError, match=r"^the controller 'PI \+ notch' cannot be tuned: no stable loop$"):
+        tuner.tuned(0, {"loop": "bad"})
+    f = SimpleNamespace(duration_s=3.0, settle_s=0.5)
+    assert loops.span(table, f, 41) == loops.Span(3.0, 0.25, 41)
+    assert loops.span(SimpleNamespace(duration_s=2.0, settle_s=None), f, 41) == loops.Span(2.0, 0.5, 41)
+    campaign.table.loop = None
+    assert loops.controllers(campaign, None) == ()
+
+
+@pytest.mark.parametrize(
+    ("varies", "own", "duration_s", "rows", "chunk"),
+    [
+        (True, 3, 1.0, 1024, 32),  # of 20 million steps 62.5 rows, each a batch of 64 runs of 5000
+        (True, 200, 1.0, 1024, 8),  # four batches each: 15.6 rows
+        (False, 3, 0.25, 1024, 1024),  # as many as there may be
+        (False, 3, 0.25, 100, 64),  # as there are
+        (False, 3, 1e6, 1024, 32),  # 22 rows fill a batch
+    ],
+)
+def test_a_chunk_of_a_loop_is_a_second_of_steps_and_whole_batches(monkeypatch, varies, own, duration_s, rows, chunk):
+    f = SimpleNamespace(plant_step_s=2e-4, settle_s=0.0, duration_s=duration_s)
+    monkeypatch.setattr(rows_plan.loops, "settings", lambda mission: f)
+    table = SimpleNamespace(loop=SimpleNamespace(duration_s=None, settle_s=None), seed=1, precision=None)
+    outputs = [SimpleNamespace(group="residual")]
+    given = {"mission": None, "chunk_rows": None, "block": 32, "outputs": outputs, "rows": rows}
+    campaign = SimpleNamespace(table=table, loop_varies=varies, realisations=own, **given)
+    assert planned(campaign) == Plan(chunk, chunk, (rows,), False)
+    assert planned(SimpleNamespace(**{**vars(campaign), "chunk_rows": 4})) == Plan(4, chunk, (rows,), False)
+    outputs.append(SimpleNamespace(group="day"))
+    assert planned(campaign) == Plan(8, 8, (rows,), False)
+    table.loop = None
+    assert planned(campaign) == Plan(8, 8, (rows,), False)
+    outputs.pop()
+    assert planned(campaign) == Plan(*[1 << rows.bit_length() - 1] * 2, (rows,), True)

@@ -1,6 +1,7 @@
 """Statistics of rows: quantiles against those of NumPy, and every interval against how often it holds the truth."""
 
 import math
+from contextlib import nullcontext
 from dataclasses import astuple, replace
 from types import SimpleNamespace
 
@@ -644,3 +645,55 @@ def test_the_cell_that_misses_least_comes_first_and_one_without_a_row_last() -> 
 def test_the_tails_of_a_rank_go_by_the_rows_that_its_weights_are_worth(rank, probability, few, many) -> None:
     rows = ordered(np.arange(6.0), np.array([2.0, 0.5, 1.0, 3.0, 0.25, 1.25]))
     assert _tails(rows, rank, probability) == pytest.approx((few, many), rel=1e-6)
+
+
+def test_a_summary_of_several_cells_has_the_rows_that_failed_of_each_and_no_more_than_are_listed(monkeypatch) -> None:
+    monkeypatch.setattr(summary, "MOST_FAILED", 4)
+    campaign = a_campaign(fixed={"link.power": "5 W"}, realisations=3, warnings=("of the file",))
+    campaign.table.sampling = "sobol"
+    campaign.table.loop = SimpleNamespace(controller="LQG", axes="both", mirror=Variant.GIVEN)
+    found = [a_chunk(number, rows, rows[1:], margin=rows) for number, rows in enumerate(([0, 1, 2], [3, 4]))]
+    cells = [CellRows(campaign, 0, found), CellRows(campaign, 1, [a_chunk(5, [7, 8, 9], [8, 9], margin=[1, 2, 3])])]
+    for cell, words in zip(cells, ("", "the second is imprecise"), strict=True):
+        monkeypatch.setattr(cell, "precision_words", lambda words=words: words)
+    head = SimpleNamespace(campaign_name="c", mission_name="m", hashes={"code": "x"}, seed=41)
+    whole = summary.assembled(head, campaign, cells, ["first", "second"], "pace")
+    assert (whole.name, whole.mission_name, whole.hashes, whole.seed, whole.sampling) == (
+        "c", "m", {"code": "x"}, 41, "sobol"
+    )  # fmt: skip
+    assert [(cell, each.row) for cell, each in whole.failed] == [(0, 1), (0, 2), (0, 4), (1, 8)]
+    assert (whole.loop, whole.cells, whole.progress) == ("LQG, both axes, 3 runs a row", ("first", "second"), "pace")
+    assert (whole.inputs, whole.fixed, whole.limits) == (campaign.inputs, campaign.fixed, campaign.limits)
+    assert whole.warnings == ("of the file", "5 of 8 rows have no result; the figures are those of the others.")
+    assert whole.findings == ("the second is imprecise",)
+    assert (whole.sensitivities, whole.sample, whole.worst) == ((), {}, ())
+
+
+def test_a_campaign_is_as_far_as_the_first_round_of_all_its_cells(monkeypatch, tmp_path) -> None:
+    campaign = a_campaign(limits=(Limit("margin", None, 3.0, ""),))
+    chunks = [[a_chunk(0, [0, 1], margin=[1.0, 5.0])], [a_chunk(0, [0, 1, 2], margin=[2.0, 7.0, 3.0])]]
+    traces = [SimpleNamespace(cell=c, row=r, value=v) for c, r, v in ((1, 0, 2.0), (0, 1, 5.0), (1, 1, 7.0))]
+    book = SimpleNamespace(
+        head=SimpleNamespace(bundle="bundle", campaign_name="c", mission_name="m", hashes={}, seed=1),
+        notes=lambda: {"seconds": 10.0, "state": "running"}, traces=lambda: traces, chunks=lambda cell: chunks[cell],
+        still=nullcontext,
+    )  # fmt: skip
+    asked = []
+    opened = lambda path, write: asked.append((path, write)) or nullcontext(book)  # noqa: E731
+    monkeypatch.setattr(summary.Ledger, "open", opened)
+    monkeypatch.setattr(
+        summary.bundle,
+        "opened",
+        lambda of, any_code: asked.append((of, any_code)) or SimpleNamespace(campaign=campaign),
+    )
+    monkeypatch.setattr(summary, "planned", lambda of: SimpleNamespace(rounds=(10, 40)))
+    monkeypatch.setattr(summary, "is_written", lambda path: path == tmp_path)
+    monkeypatch.setattr(summary, "_sensitivities", lambda of, cell: ("of", cell.rows))
+    campaign.table.sampling, campaign.fixed = "sobol", {}
+    found = summary.summarise_campaign(tmp_path)
+    assert asked == [(tmp_path, False), ("bundle", True)]
+    assert found.progress == Progress(5, 20, 10.0, 0.5, 30.0, "running")
+    assert ([cell.rows for cell in found.cells], found.sensitivities) == ([2, 3], ("of", 2))
+    assert [(t.cell, t.row) for t in found.worst] == [(0, 1), (1, 1), (1, 0)]
+    assert found.sample["margin"].tolist() == [1.0, 5.0, 2.0, 7.0, 3.0]
+    assert found.sample["cell"].tolist() == [0.0, 0.0, 1.0, 1.0, 1.0]

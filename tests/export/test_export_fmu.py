@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import fmpy
 import numpy as np
@@ -29,7 +30,7 @@ from loops import IDEAL_DRIVE
 from microrad.core import kernels, lti
 from microrad.export import choice
 from microrad.export.flight.build import compiler
-from microrad.export.fmi import fmu
+from microrad.export.fmi import description, fmu
 from microrad.export.fmi.description import plant_of, variables
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
 from microrad.loop import control
@@ -1141,3 +1142,108 @@ def test_arrays_are_their_elements_in_the_older_version_in_the_same_order():
     assert len(old) == sum(each[4] or 1 for each in new)
     starts = [x for each in new if each[5] is not None for x in each[5]]
     assert [x for each in old if each[5] is not None for x in each[5]] == starts
+
+
+def test_a_loop_shows_its_signals_counters_and_constants_behind_each_other():
+    unit = UNITS["loop"]()
+    of = replace(unit.controller, period_s=4e-4, minimum_v=-4.5, maximum_v=7.25)
+    plant = replace(rich_unit(), bias_v=6.5)
+    unit = replace(unit, plant=plant, controller=of, delay_steps=7)
+    listed = [v for v in variables(unit, "3.0") if v.causality != "parameter"]
+    named = [(v.name, v.place, v.causality, v.unit, v.size, v.variability, v.initial) for v in listed]
+    whole = ("output", "", None, "discrete", "calculated")
+    counters = [(each[0], each[1], *whole) for each in description.PLANT_COUNTERS + description.CONTROLLER_COUNTERS]
+    assert named[1:-6] == [
+        ("reference_rad", "reference_rad", "input", "rad", 3, "continuous", None),
+        ("disturbance_rad", "disturbance_rad", "input", "rad", 3, "continuous", None),
+        ("error_rad", "error_rad", "output", "rad", 3, "continuous", "calculated"),
+        ("command_v", "loop.command_v", "output", "V", 2, "continuous", "calculated"),
+        ("line_of_sight_rad", "line_of_sight_rad", "output", "rad", 3, "continuous", "calculated"),
+        ("mirror_rad", "plant.y", "output", "rad", 2, "continuous", "calculated"),
+        ("drive_v", "plant.u", "output", "V", 2, "continuous", "calculated"),
+        *counters,
+    ]
+    assert [(v.name, v.place, v.unit, v.start, v.variability, v.initial) for v in listed[-6:]] == [
+        (name, f"constants[{i}]", unit, (value,), "constant", "exact")
+        for i, (name, unit, value) in enumerate([
+            ("bias_v", "V", 6.5), ("plant_step_s", "s", 2e-5), ("control_period_s", "s", 4e-4),
+            ("computation_delay_s", "s", pytest.approx(1.4e-4)), ("command_minimum_v", "V", -4.5),
+            ("command_maximum_v", "V", 7.25),
+        ])
+    ]  # fmt: skip
+    second = next(v for v in listed if v.name == "error_rad").elements[1]
+    assert (second.name, second.place, second.size) == ("error_rad[2]", "error_rad[1]", None)
+    assert second.dependencies == ("reference_rad[2]", "disturbance_rad[2]")
+    plays = next(v for v in variables(unit, "3.0") if v.name == "prandtl_ishlinskii[2].weight_rad_v")
+    assert (plays.begin, [(e.name[-3:], e.place, e.start) for e in plays.elements]) == (
+        "plant.weight[3]", [("[1]", "plant.weight[3]", (4e-5,)), ("[2]", "plant.weight[4]", (1e-5,))]
+    )  # fmt: skip
+
+
+def test_what_a_unit_is_called_has_its_names_and_step_on_one_line():
+    of = UNITS["loop"]()
+    named = replace(of, controller=replace(of.controller, name="PI\n\tone"), plant=rich_unit())
+    end = f'internal step 2e-05 s. Mission: a <mission> & "more", sha256 {"0" * 64}.'
+    assert description._described(named) == (
+        "all there */ is, closed loop of PI one",
+        f"Amplifier, mirror with hysteresis, sensors and controller PI one, {end}",
+    )
+    assert description._described(rich_unit()) == (
+        "all there */ is", f"Amplifier and fast steering mirror with hysteresis, {end}"
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "wide", "old", "new", "ending"),
+    [
+        ("linux", "x86_64", True, "linux64", "x86_64-linux", ".so"),
+        ("linux", "i686", False, "linux32", "x86-linux", ".so"),
+        ("linux", "x86_64", False, "linux32", "x86-linux", ".so"),  # Python of 32 bits
+        ("linux", "aarch64", True, "linux64", "aarch64-linux", ".so"),
+        ("linux", "RISCV64", True, "linux64", "riscv64-linux", ".so"),
+        ("darwin", "arm64", True, "darwin64", "aarch64-darwin", ".dylib"),
+        ("win32", "AMD64", True, "win64", "x86_64-windows", ".dll"),
+        ("cygwin", "x86", False, "win32", "x86-windows", ".dll"),
+        ("freebsd14", "amd64", True, "linux64", "x86_64-linux", ".so"),
+    ],
+)
+def test_a_library_stands_in_the_folder_of_its_system_and_machine(monkeypatch, system, machine, wide, old, new, ending):
+    here = SimpleNamespace(platform=system, maxsize=2**63 - 1 if wide else 2**31 - 1)
+    monkeypatch.setattr(fmu, "sys", here)
+    monkeypatch.setattr(fmu.platform, "machine", lambda: machine)
+    assert (fmu._platform("2.0"), fmu._platform("3.0"), fmu._ending()) == (old, new, ending)
+
+
+def test_an_archive_begins_with_its_description_and_has_libraries_that_may_be_run(tmp_path):
+    contents = {"sources/b.c": b"2", "binaries/x/z.so": b"4", "a.txt": b"1", "modelDescription.xml": b"0" * 900}
+    (tmp_path / "x.fmu").write_bytes(fmu._archive(contents))
+    with zipfile.ZipFile(tmp_path / "x.fmu") as found:
+        listed = [(e.filename, e.external_attr >> 16, e.create_system, e.date_time) for e in found.infolist()]
+        assert {name: found.read(name) for name in found.namelist()} == contents
+        assert found.infolist()[0].compress_size < 100
+    epoch = (1980, 1, 1, 0, 0, 0)
+    assert listed == [
+        ("modelDescription.xml", 0o100644, 3, epoch), ("a.txt", 0o100644, 3, epoch),
+        ("binaries/x/z.so", 0o100755, 3, epoch), ("sources/b.c", 0o100644, 3, epoch),
+    ]  # fmt: skip
+
+
+def test_a_loop_takes_each_reading_from_where_it_is_measured():
+    unit = UNITS["loop"]()
+    first = unit.controller.inputs[0]
+    names = ["gauge_rad", "reference_rad", "optical_error_rad"]
+    inputs = tuple(Signal(name, 1, "rad", first.meaning, first.limit) for name in names)
+    made = replace(unit, controller=replace(unit.controller, inputs=inputs), field_of_view_rad=3e-3)
+    found = fmu._loop_values(made)
+    assert found["arguments"] == ["gauge_rad", "reference_rad", "loop->reading_rad"]
+    assert [found[key] for key in ("optical", "gauge", "reading", "reference")] == [True, True, False, True]
+    assert found["field_of_view_rad2"] == pytest.approx(9e-6)
+    wide = fmu._loop_values(replace(made, field_of_view_rad=math.inf))
+    assert wide["field_of_view_rad2"] == sys.float_info.max
+    other = replace(made.controller, inputs=(*inputs, *(replace(inputs[0], name=n) for n in ("star", "moon"))))
+    with pytest.raises(ExportError) as told:
+        fmu._loop_values(replace(made, controller=replace(other, name="PI")))
+    assert str(told.value) == (
+        "controller 'PI' reads star, moon, which a loop does not measure: it has optical_error_rad, gauge_rad, "
+        "reading_rad, reference_rad"
+    )

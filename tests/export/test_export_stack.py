@@ -130,3 +130,21 @@ def test_the_report_states_it(tmp_path, monkeypatch):
     assert (done.bench.cycles_per_ns > 0.1) == counts
     assert ("  cycles        " in (tmp_path / "flight" / "report.txt").read_text()) == counts
     assert not list((tmp_path / "flight").glob("*.ci"))
+
+
+def test_of_two_ways_to_a_function_the_deeper_one_counts_and_each_library_call_is_told_once():
+    more = r"""
+node: { title: "y.c:last" label: "last\ny.c:9:1\n500 bytes (static)" }
+edge: { sourcename: "x.c:wide" targetname: "y.c:last" label: "x.c:4:9" }
+edge: { sourcename: "x.c:deeper" targetname: "y.c:last" label: "x.c:3:9" }
+edge: { sourcename: "y.c:last" targetname: "pow" label: "y.c:9:2" }
+edge: { sourcename: "y.c:last" targetname: "exp" label: "y.c:9:3" }
+edge: { sourcename: "y.c:last" targetname: "log" label: "y.c:9:4" }
+"""
+    found = stack.deepest(GRAPH + more, "step")
+    assert found == stack.StackUse(100 + 40 + 30 + 500, ("exp", "log", "pow"))
+    assert found.words.endswith("and what the C library takes in exp, log, pow")
+    assert stack.deepest(GRAPH + more, "x.c:wide") == stack.StackUse(560, ("exp", "log", "pow"))
+    assert stack.deepest(GRAPH, "x.c:deeper").words == "30 bytes at most, from this machine's compiler"
+    bounded = GRAPH.replace("9000 bytes (static)", "9000 bytes (dynamic,bounded)")
+    assert stack.deepest(bounded, "step") is None, "not even where the step does not call it"

@@ -1333,3 +1333,29 @@ def test_a_loss_by_the_margin_and_one_by_the_spot_are_told_with_every_number(sam
     sees = f"{format_quantity(1.25 * seen, 'rad', 2)} off, it sees {format_quantity(seen, 'rad')}"
     assert loss.cause == f"spot beyond the optical sensor's field of view at 1000.001 s: {sees}"
     assert (loss.time_s, loss.known_s) == (pytest.approx(1000.0008), loss.time_s)
+
+
+@pytest.mark.parametrize(("place", "free_s"), [(0, -50.0), (1, 320.0), (2, 990.0)])
+def test_the_body_is_free_from_the_end_of_the_contact_before(monkeypatch, place, free_s):
+    words = [("dawn", "dusk"), ("rise", "set"), ("slot", "slot's end")]
+    times = [(100.0, 320.0), (700.0, 990.0), (1200.0, 1500.0)]
+    contacts = [
+        SimpleNamespace(start_s=a, end_s=b, begins=begins, ends=ends)
+        for (a, b), (begins, ends) in zip(times, words, strict=True)
+    ]
+    ends = SimpleNamespace(orbit="low"), SimpleNamespace(orbit="high")
+    pair = SimpleNamespace(span_s=(-50.0, 2000.0), leo=ends[0], geo=ends[1])
+    day = SimpleNamespace(view=SimpleNamespace(pair=pair), relay=SimpleNamespace(contacts=contacts))
+    found = sequence._contact(day, place)
+    assert (found.start_s, found.end_s, found.begins, found.ends) == (*times[place], *words[place])
+    assert found.free_from_s == free_s
+
+    def sight(low, high, time_s):
+        assert (low, high, time_s.shape) == ("low", "high", (6,))
+        return SimpleNamespace(range_m=time_s + 1.0, rate_rad_s=time_s + 2.0, point_ahead_rad=time_s + 3.0)
+
+    monkeypatch.setattr(sequence.orbit, "sight", sight)
+    at = np.arange(6.0).reshape(2, 3)
+    seen = found.geometry(at)
+    for name, more in (("range_m", 1.0), ("rate_rad_s", 2.0), ("point_ahead_rad", 3.0)):
+        np.testing.assert_array_equal(getattr(seen, name), at + more)

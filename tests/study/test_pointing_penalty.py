@@ -138,3 +138,35 @@ def test_errors_in_bins_lie_evenly_in_the_square_and_have_their_quantiles():
     middle = math.sqrt(edges[7] ** 2 + 0.5 * (edges[8] ** 2 - edges[7] ** 2))
     assert binned.quantile_rad(0.3) == pytest.approx(middle, rel=1e-12)
     assert binned.quantile_rad(0.9) == pytest.approx(edges[9], rel=1e-12)
+
+
+def test_each_loop_that_was_simulated_is_a_case_on_each_mirror(monkeypatch):
+    monkeypatch.setattr(pointing_penalty, "_sine", lambda data, radial, run: case(f"{radial}", run, "given", 1.0))
+    monkeypatch.setattr(pointing_penalty, "_fine", lambda data, fine, of, on: case(fine.name, of.name, on, 2.0))
+    monkeypatch.setattr(pointing_penalty, "stated_outage", lambda required: required / 4.0)
+    data = SimpleNamespace(requirement=0.01, beam=SimpleNamespace(fall=SimpleNamespace(half_angle_rad=7e-6)))
+    verified = [SimpleNamespace(name=n, simulated=dict.fromkeys(on)) for n, on in (("PI", "ab"), ("LQG", "b"))]
+    fine = SimpleNamespace(name="fine", verified=verified)
+    for residual, radial in (("radial", True), ("per-axis", False)):
+        found = pointing_penalty.performance_of_loops(data, residual, ("PID", "PI"), fine)
+        assert (found.outage, found.half_angle_rad, found.costs) == (0.0025, 7e-6, ())
+        rows = [(c.source, c.controller, c.mirror) for c in found.cases]
+        sines = [(str(radial), "PID", "given"), (str(radial), "PI", "given")]
+        assert rows == [*sines, ("fine", "PI", "a"), ("fine", "PI", "b"), ("fine", "LQG", "b")]
+        assert len(pointing_penalty.performance_of_loops(data, residual, ("PID",), None).cases) == 1
+
+
+def test_binned_errors_are_spread_evenly_in_the_square_and_have_the_histograms_quantiles():
+    edges, counts = bin_edges_rad(), np.zeros(bin_edges_rad().size - 1, dtype=np.int64)
+    counts[[2, 7, 40]] = 5, 3, 2
+    found = pointing_penalty.Binned.of(counts)
+    assert found.radius_rad.size == found.share.size == 32 * counts.size
+    here = found.share.reshape(-1, 32)
+    np.testing.assert_allclose(here[[2, 7, 40]].sum(axis=1), [0.5, 0.3, 0.2])
+    steps = np.diff(found.radius_rad[32 * 7 : 32 * 8] ** 2)
+    np.testing.assert_allclose(steps, (edges[8] ** 2 - edges[7] ** 2) / 32, rtol=1e-9)
+    assert found.radius_rad[32 * 7] ** 2 == pytest.approx(edges[7] ** 2 + steps[0] / 2, rel=1e-12)
+    for share, at, within in ((0.5, 2, 1.0), (0.65, 7, 0.5), (0.85, 40, 0.25)):
+        wanted = edges[at] ** 2 + within * (edges[at + 1] ** 2 - edges[at] ** 2)
+        assert found.quantile_rad(share) == pytest.approx(math.sqrt(wanted), rel=1e-12)
+    assert (found.beyond(edges[8]), found.beyond(edges[3])) == pytest.approx((0.2, 0.5))

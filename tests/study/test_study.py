@@ -630,3 +630,64 @@ def test_the_paper_loop_is_judged_where_there_is_no_other_and_stands_beside_it_e
     assert study.judged(links, paper, None, None) == (("beam", "fading", "residual"), ())
     assert study.judged(links, paper, object(), None) == (("beam", "fading", "residual"), ())
     assert study.judged(links, paper, object(), object()) == (("beam", "fading", "fine"), paper)
+
+
+# --------------------------------------------------------------------------------- who is asked for what, one by one
+def test_a_loop_is_judged_by_its_own_requirement_and_sources(monkeypatch):
+    monkeypatch.setattr(study.requirement, "of_beams", lambda links: ("beam", links.data.requirement))
+    monkeypatch.setattr(study.requirement, "of_fading", lambda links: ("fading", links.file.sources))
+    monkeypatch.setattr(study.verdict, "of_fine_pointing", lambda *given: given)
+    links = SimpleNamespace(data=SimpleNamespace(requirement="wanted"), file=SimpleNamespace(sources="sources"))
+    judged = ("beam", "wanted", "fading", "sources", "wanted", "sources", "fine", "case")
+    assert study.judged(links, ("paper",), "fine", "case") == (judged, ("paper",))
+
+
+@pytest.mark.parametrize("coupled", [True, False])
+def test_a_fine_pointing_loop_is_designed_by_its_kind_with_its_parts_and_progress(monkeypatch, coupled):
+    monkeypatch.setattr(study.coupled_study, "CoupledScene", str if coupled else int)
+    monkeypatch.setattr(study.coupled_study, "design_and_simulate", "of several")
+    monkeypatch.setattr(study.controller_study, "design_and_simulate", "of each axis")
+    parts = SimpleNamespace(part=lambda *given, **told: (given, told))
+    found = study.fine_pointing_loop("scene", parts, "progress")
+    assert found == (("of several" if coupled else "of each axis", "scene"), {"on_progress": "progress"})
+
+
+def test_the_best_case_is_that_of_the_best_controller_on_the_missions_own_mirror():
+    fine = SimpleNamespace(best=SimpleNamespace(design=SimpleNamespace(name="LQG")))
+    rows = [(s, c, m) for s in ("sine of 25 Hz", "vibration and noise") for c in ("PI", "LQG") for m in study.Variant]
+    cases = tuple(SimpleNamespace(source=s, controller=c, mirror=m) for s, c, m in rows)
+    held = study.pointing_penalty.LinkPerformance(0.01, 1e-6, cases, ())
+    found = study.best_case(held, fine)
+    assert (found.source, found.controller, found.mirror) == ("vibration and noise", "LQG", study.Variant.GIVEN)
+    assert study.best_case(held, None) is None
+
+
+def test_a_tornado_moves_the_margin_at_its_error_for_each_mission_that_is_moved(monkeypatch):
+    asked = []
+    monkeypatch.setattr(study.link, "margin_of_error", lambda data, error: np.float64(data + 1e6 * error))
+    monkeypatch.setattr(study.link, "of", lambda mission: 100.0 * mission)
+
+    def swings(m, sources, tables, strehl, margin, passes):
+        asked.append((m, sources, tables, strehl, passes))
+        return margin(3), margin(5)
+
+    monkeypatch.setattr(study.link, "swings", swings)
+    m = SimpleNamespace(conventions=SimpleNamespace(strehl="marechal"))
+    links = SimpleNamespace(data=7.0, file=SimpleNamespace(mission=m, sources="sources"))
+    found = study.tornado(links, 2e-6)
+    assert (found.of, found.margin_db, found.swings) == ("Communication", 9.0, (302.0, 502.0))
+    assert asked == [(m, "sources", study.link.LINK_TABLES, "marechal", study.link.beam_passes)]
+
+
+def test_parts_that_are_kept_are_those_of_the_day_its_contact_and_its_constellation(monkeypatch):
+    mission = SimpleNamespace(orbit="orbit", operations="ops", constellation="relays", acquisition="acquisition")
+    file = SimpleNamespace(mission=mission)
+    links = SimpleNamespace(file=file, data="data", finding="finding")
+    monkeypatch.setattr(study.orbit, "repeats", lambda *of: of == ("relays", "orbit"))
+    parts = SimpleNamespace(part=lambda *given: given)
+    day, contact, plan = study.delivered(links, "loss", "fine", parts)
+    assert day == (study.day_study.run_day_study, links, "loss")
+    assert contact == (study.contact_run.of_mission, "ops", "acquisition", "data", day, "finding", "fine")
+    assert plan == (study.constellation.run_constellation, file, "loss")
+    asked = SimpleNamespace(with_loop=False)
+    assert study.pointing_errors(asked, None, parts) == (study.error_budget.judge, asked, None)

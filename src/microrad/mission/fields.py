@@ -303,7 +303,9 @@ class Several:
     @property
     def example(self) -> str:
         """A list of one item, unless another one is shown."""
-        return self.shown or f'["{self.each.example}"]' if self.each.unit else f"[{self.each.example}]"
+        if self.shown:
+            return self.shown
+        return f'["{self.each.example}"]' if self.each.unit else f"[{self.each.example}]"
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Read the list in place of pydantic's own tuple."""
