@@ -1018,7 +1018,7 @@ def test_a_variable_has_its_unit_and_the_range_it_was_searched_in():
 
 
 RATE = Limit("data_rate", None, 622.08e6, "test")
-RESIDUAL = Limit("residual_rms", 2.5e-6, 12.5e-6, "test")
+RMS = Limit("residual_rms", 2.5e-6, 12.5e-6, "test")
 
 
 def kept(excess, share=0.5, limit=MARGIN, high=1.0):
@@ -1026,7 +1026,7 @@ def kept(excess, share=0.5, limit=MARGIN, high=1.0):
 
 
 def test_a_limit_in_words_has_each_side_in_its_unit():
-    said = [kept(0.0, limit=limit).wanted for limit in (MARGIN, RATE, RESIDUAL, Limit("outage", None, 0.0125, ""))]
+    said = [kept(0.0, limit=limit).wanted for limit in (MARGIN, RATE, RMS, Limit("outage", None, 0.0125, ""))]
     assert said == [
         "margin >= 3 dB",
         "data_rate <= 622.1 Mbit/s",
@@ -1290,11 +1290,11 @@ def test_a_file_without_an_optimisation_is_refused_by_its_name(monkeypatch):
 
 # ------------------------------------------------------------------------------ several variables and limits, unlike
 POWER_W, ANGLE = Variable("power", "W", 0.5, 4.0), Variable("angle", "rad", 1e-6, 9e-5)
-RESIDUAL, RESIDUAL = Limit("residual_quantile", None, 1e-5, ""), Limit("margin", 3.0, 9.5, "")
+RESIDUAL, BOTH = Limit("residual_quantile", None, 1e-5, ""), Limit("margin", 3.0, 9.5, "")
 
 
 def two_variables(**changes):
-    given = {"variables": (POWER_W, ANGLE), "minimise": "power", "limits": (RESIDUAL, RESIDUAL), "confidence": 0.8}
+    given = {"variables": (POWER_W, ANGLE), "minimise": "power", "limits": (BOTH, RESIDUAL), "confidence": 0.8}
     return problem(**given | changes)
 
 
@@ -1311,7 +1311,7 @@ def test_each_limit_is_judged_by_its_own_output_side_and_weights():
     assert (margin.value, margin.excess) == (2.5, -0.5)  # 10.5 is a twentieth and may miss it, 2.5 with it may not
     assert (residual.value, residual.excess) == pytest.approx((1.5e-5, -5e-6))
     assert (margin.share.value, residual.share.value) == pytest.approx((0.75, 0.55))
-    assert [k.limit for k in found.kept] == [RESIDUAL, RESIDUAL] and not found.feasible
+    assert [k.limit for k in found.kept] == [BOTH, RESIDUAL] and not found.feasible
     assert margin.wanted == "margin >= 3 dB and <= 9.5 dB"
     assert judged(two_variables(minimise="-angle"), {"power": 2.0, "angle": 5e-5}, columns).cost == 5e-5
     with pytest.raises(CampaignError) as told:

@@ -1390,3 +1390,19 @@ def test_a_drive_of_sixty_hertz_about_six_volts_is_told_in_volts():
     t = np.arange(400) / 2000.0
     recording = ns(drive=(3.0 + 2.5 * np.sin(2 * np.pi * 60.0 * t))[:, None], rate_hz=2000.0)
     assert words.drive_text(recording, 2.0) == "60 Hz, ± 5 V about 6 V"
+
+
+@pytest.mark.parametrize(
+    ("freq_hz", "samples", "size", "found"),
+    [
+        (10.0, 1000, 2.5, (10.0, 2.5)),
+        (2.0, 1000, 1.0, (2.0, 1.0)),
+        (1.0, 1000, 1.0, None),
+        (13.3, 950, 0.25, (13.3, 0.25)),
+    ],
+)
+def test_a_drive_is_a_sine_from_two_periods_on_wherever_it_is_centred(freq_hz, samples, size, found):
+    time = np.arange(samples) / 1000.0
+    sine = words.sine_of(7.0 - size * np.sin(2 * np.pi * freq_hz * time), 1000.0)
+    assert (sine and (sine.freq_hz, sine.amplitude_v)) == (found and pytest.approx(found, rel=1e-5))
+    assert words.sine_of(7.0 + np.where(time % 0.1 < 0.03, size, 0.0), 1000.0) is None

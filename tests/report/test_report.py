@@ -1016,3 +1016,77 @@ def test_a_source_of_errors_is_advised_so_many_times_its_size(kind, stated, allo
     if allowed == 0.25:
         assert found.endswith("= 1 nrad/s or less")
     assert requirement_views.advice(of, first) == "; to move it, raise fine_pointing.rate"
+
+
+# ------------------------------------------------------------------------------- drawings, readings and words by hand
+def test_the_drawings_of_a_mission_of_unlike_numbers(monkeypatch):
+    lines = [ns(name=name, value=value) for name, value in (("Body", 2.5e-4), ("Orbit", 1.1e-5), ("Mount", 7e-5))]
+    lines += [ns(name="Fourth", value=1e-6), ns(name="Fifth", value=2e-6)]
+    m = ns(
+        beacon=ns(divergence_rad=8.4e-4),
+        answer=ns(divergence_rad=4.6e-5),
+        point_ahead=None,
+        communication=ns(data_rate_bit_s=622.08e6),
+        range_m=lambda of: 4.12e7,
+        control=ns(
+            proportional_v_rad=1250.0, integral_v_rad_s=1.6e7, derivative_v_s_rad=0.5,
+            rate_hz=12500.0, delay_s=3.2e-5, sensor_resolution_rad=2.71e-8,
+        ),
+        amplifier=ns(bandwidth_hz=4200.0),
+        mirror=ns(linear=None, bouc_wen=None),
+    )  # fmt: skip
+    study = ns(file=ns(mission=m), open_loop=ns(lines=lines, rss_rad=3.1e-4, beacon_half_angle_rad=6.2e-4))
+    relay = drawings.relay(study)
+    assert (relay["height"], relay["range"]) == (420.0, "41200 km")
+    assert [(row["text"], round(row["width"], 3), row["colour"]) for row in relay["errors"]] == [
+        ("Body 250 µrad", 80.645, "#E69F00"),
+        ("Orbit 11 µrad", 3.548, "#56B4E9"),
+        ("Mount 70 µrad", 22.581, "#009E73"),
+        ("Fourth 1 µrad", 0.323, "#CC79A7"),
+        ("Fifth 2 µrad", 0.645, "#E69F00"),
+        ("root sum square 310 µrad", 100.0, "#1b1f24"),
+        ("cone of the beacon 620 µrad", 200.0, "#0072B2"),
+    ]
+    steps = ["wide beacon, 840 µrad", "answer, 46 µrad", "narrow beam back", "lock; 622.1 Mbit/s"]
+    assert relay["sequence"] == steps and f"Sequence: {'; '.join(steps)}. Open-loop" in relay["words"]
+    assert relay["words"].endswith("Fifth 2 µrad, root sum square 310 µrad, cone of the beacon 620 µrad.")
+    control = drawings.control(study)
+    gains = ("Kp 1.25 V/mrad", "Ki 16000 V/(mrad s)", "Kd 0.0005 V s/mrad")
+    assert control["pid"] == ("PID", *gains, "12.5 kHz, 32 µs late")
+    assert control["plant"] == ("Mirror", "amplifier, 4.2 kHz", "hysteresis")
+    assert control["sensor"] == ("Strain gauge", "0.0271 µrad steps")
+    assert f"PID ({', '.join(gains)}, at 12.5 kHz, 32 µs late) on the" in control["words"]
+    assert "mirror (amplifier, 4.2 kHz, hysteresis), whose" in control["words"]
+
+
+def test_other_readings_stand_below_the_missions_own_with_what_they_turn(monkeypatch):
+    monkeypatch.setattr(requirement_views, "unknown", lambda mirror: "")
+    of = requirement_views.Reading
+    study = ns(
+        file=ns(mission=ns(requirement=ns(pointing_error_rad=9e-6, margin_db=3.5), mirror=None)),
+        left_rad=lambda run: 8.9e-6,
+        residual=None,
+        achieved=ns(margin_db=3.5),
+        other_readings=[
+            of("a.b", "one", "other", 9.1e-6, 4.25),
+            of("c.d", "two", "third", 5e-6, -0.004),
+            of("e.f", "x", "y", math.nan, math.nan, "it does not run"),
+        ],
+    )
+    table = requirement_views.readings_table(study)
+    assert [[str(cell) for cell in row] for row in table.rows] == [
+        ["as it stands", "", "", "8.9 µrad", "3.50 dB", "yes", "PASS"],
+        ["a.b", "one", "other", "9.1 µrad", "4.25 dB", "yes", "FAIL"],
+        ["c.d", "two", "third", "5 µrad", "−0.004 dB", "no", "FAIL"],
+        ["e.f", "x", "y", "it does not run", "", "", ""],
+    ]
+    assert [row[0].code for row in table.rows] == [False, True, True, True]
+    assert words.read_otherwise(study) == [
+        "With one point of the paper read otherwise that link would not close: c.d = third (−0.004 dB)."
+    ]
+    study.other_readings, study.achieved.margin_db = study.other_readings[:1], -1.0
+    assert words.read_otherwise(study) == [
+        "With one point of the paper read otherwise that link would close: a.b = other (4.25 dB)."
+    ]
+    study.other_readings = [of("e.f", "x", "y", math.nan, math.nan, "it does not run")]
+    assert words.read_otherwise(study) == []

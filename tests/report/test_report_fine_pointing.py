@@ -2053,3 +2053,79 @@ def test_all_that_is_said_of_a_made_up_study(fine, mission):
             "stand for the other"
         ),
     ]
+
+
+# ------------------------------------------------------------------------------------------ quantities as they are told
+@pytest.mark.parametrize(
+    ("value", "unit", "digits", "text", "with_sign"),
+    [
+        (-0.004, "dB", 3, "−0.004 dB", "−0.004 dB"),  # two decimals would make a shortfall none
+        (-0.0004, "dB", 3, "−0.0004 dB", "−0.0004 dB"),
+        (-0.005, "dB", 3, "−0.005 dB", "−0.005 dB"),
+        (-0.0051, "dB", 3, "−0.01 dB", "−0.01 dB"),
+        (0.004, "dB", 3, "0.00 dB", "+0.00 dB"),
+        (-1e-13, "dB", 3, "0.00 dB", "+0.00 dB"),
+        (12.3456, "dB", 5, "12.3456 dB", "+12.3456 dB"),
+        (-12.3456, "dBm", 3, "−12.35 dBm", "−12.35 dBm"),
+        (-4.2e-6, "rad", 3, "−4.2 µrad", "−4.2 µrad"),
+        (622.08e6, "bit/s", 5, "622.08 Mbit/s", "+622.08 Mbit/s"),
+        (622.08e6, "bit/s", 3, "622 Mbit/s", "+622 Mbit/s"),
+        (-math.inf, "dB", 3, "−inf dB", "−inf dB"),
+        (math.inf, "dB", 4, "inf dB", "+inf dB"),
+        (9.9e-21, "", 3, "below 1e-20", "+below 1e-20"),
+    ],
+)
+def test_a_quantity_has_its_digits_and_a_shortfall_is_never_none(value, unit, digits, text, with_sign):
+    assert (quantities.quantity(value, unit, digits), quantities.signed(value, unit, digits)) == (text, with_sign)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("micro", 1e-9, "0.001"),
+        ("micro", 0.9995e-9, "< 0.001"),
+        ("micro", -0.04e-6, "−0.040"),
+        ("micro", 99.94e-6, "99.9"),
+        ("micro", 99.951e-6, "100"),
+        ("micro", -0.25e-3, "−250"),
+        ("micro", 9.994e-6, "9.99"),
+        ("angle", 999.4e-6, "999 µrad"),
+        ("angle", 1e-3, "1 mrad"),
+        ("angle", -0.5e-3, "−500 µrad"),
+        ("given_angle", 12.34567e-6, "12.35 µrad"),
+        ("given_angle", 0.3e-3, "300 µrad"),
+        ("percent", 1.001e-5, "0.001 %"),
+        ("percent", 0.99e-5, "< 0.001 %"),
+        ("percent", 12.3456, "1200 %"),
+        ("percent", -0.0345, "−3.5 %"),
+        ("share_of_time", 0.99865, "99.865 %"),
+        ("share_of_time", 0.5, "50 %"),
+        ("volume", 8e9, "1 GB"),
+        ("volume", 622.08e6 * 60.0, "4.67 GB"),
+        ("duration", math.inf, "never"),
+        ("duration", 90061.0, "25 h"),
+        ("duration", 0.0123456, "0.0123 s"),
+        ("power_text", 1e5, "10⁵"),
+        ("power_text", -1e5, "−10⁵"),
+        ("power_text", 9.9996, "10¹"),
+        ("power_text", 2.4999e-7, "2.5×10⁻⁷"),
+        ("power_text", -3.14159e22, "−3.14×10²²"),
+        ("minus", "-3 to -inf, a-4, 1e-5 and (-0.5)", "−3 to −inf, a-4, 1e-5 and (−0.5)"),
+    ],
+)
+def test_each_kind_of_number_as_it_is_told(name, value, text):
+    assert getattr(quantities, name)(value) == text
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "unit", "told"),
+    [
+        (622.08e6, 622.09e6, "bit/s", ("622.08 Mbit/s", "622.09 Mbit/s")),
+        (622.084e6, 622.0841e6, "bit/s", ("622.084 Mbit/s", "622.0841 Mbit/s")),
+        (-3.001, -3.004, "dB", ("−3.001 dB", "−3.004 dB")),
+        (1.0, 1.0000004, "W", ("1 W", "1 W")),
+        (1.0, 1.000001, "W", ("1 W", "1.000001 W")),
+    ],
+)
+def test_two_values_are_told_apart_by_up_to_seven_digits(one, other, unit, told):
+    assert quantities.apart(one, other, unit) == told

@@ -24,6 +24,7 @@ from microrad.report.plotting.palette import (
     CIVIDIS,
     GREY,
     MOST_POINTS,
+    ORANGE,
     SKY,
     VERMILION,
     WHITE,
@@ -47,11 +48,13 @@ from microrad.report.plotting.sheet import (
     contour,
     grid,
     region,
+    rows,
     segments,
     shortened,
     stairs,
 )
 from microrad.report.plotting.svg import svg_of
+from microrad.report.plotting.swings import in_lines, swing_bars, swing_legend
 from microrad.report.tables import rows_of
 from report_pages import assert_sound
 from shipped import plain_drawn
@@ -1604,3 +1607,356 @@ def test_the_legend_of_a_sheet_keeps_apart_from_its_heading(place):
 def test_a_value_beside_words_has_those_nearest_to_it(title, value, said):
     axis = Axis(title, ticks={0.0: "one", 1.0: "2\nnear", 2.0: "three"})
     assert interactive._word(axis, title, value) == said
+
+
+# ------------------------------------------------------------------------------------------------ numbers unlike others
+def test_each_letter_has_its_own_width():
+    every = "".join(map(chr, range(32, 127)))
+    assert scales.width_of(every, 8.0) == pytest.approx(454.0)
+    assert sum(k * scales.width_of(each, 100.0) for k, each in enumerate(every, 1)) == pytest.approx(272910.0)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "found"),
+    [
+        (3.0, 9.0, 3, "3 5 7"),
+        (3.0, 9.0, 2, "5 7.5"),  # no tick of a decade is left: round numbers
+        (2.0, 60.0, 5, "2 5 10 20 50"),
+        (0.02, 0.06, 3, "0.02 0.03 0.05"),
+        (1e3, 1e8, 3, "1e+04 1e+06 1e+08"),
+        (1.5, 35.0, 4, "2 5 10 20"),
+        (0.7, 140.0, 4, "1 10 100"),
+        (2.0, 5.0, 2, "2 5"),
+        (12.0, 18.0, 3, "12.5 15 17.5"),
+        (7e-4, 6e-3, 4, "0.001 0.002 0.005"),
+    ],
+)
+def test_ticks_of_an_axis_of_few_decades_are_the_finest_that_there_is_room_for(low, high, most, found):
+    assert [f"{each:.4g}" for each in scales.decades(low, high, most)] == found.split()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "found"),
+    [
+        (-7.3, -1.1, 6, "−7 −6 −5 −4 −3 −2"),
+        (622.08, 1244.16, 5, "800 1000 1200"),
+        (0.0, 7e-9, 4, "0 2×10⁻⁹ 4×10⁻⁹ 6×10⁻⁹"),
+        (0.1, 0.9, 3, "0.25 0.50 0.75"),
+        (1e7, 4e7, 5, "10⁷ 2×10⁷ 3×10⁷ 4×10⁷"),
+        (-1e6, 3e6, 5, "−1000000 0 1000000 2000000 3000000"),
+    ],
+)
+def test_round_ticks_as_they_are_written(low, high, most, found):
+    assert scales.texts(scales.rounds(low, high, most)) == found.split()
+
+
+@pytest.mark.parametrize(
+    ("log", "which", "ends", "length", "found"),
+    [
+        (False, "x", (0.0, 1000.0), 130.0, "0 500 1000"),  # of a fourth there is no room between the texts
+        (False, "x", (0.0, 1e6), 200.0, "0 250000 500000 750000 1000000"),
+        (False, "x", (0.0, 1.0), 90.0, "0 1"),
+        (False, "x", (36000.001, 36000.009), 300.0, "36000.002 36000.004 36000.006 36000.008"),
+        (False, "x", (-5000.0, 5000.0), 150.0, "−5000 0 5000"),
+        (False, "x", (1e-4, 9e-4), 160.0, "2.5×10⁻⁴ 5×10⁻⁴ 7.5×10⁻⁴"),  # one tick less is enough
+        (False, "x", (36000.01, 36000.09), 180.0, "36000.025 36000.050 36000.075"),
+        (False, "y", (5000.0, -5000.0), 70.0, "−5000 0 5000"),
+        (True, "x", (1.0, 1e5), 100.0, "1 1000"),
+        (True, "y", (1e-6, 1e2), 100.0, "10⁻⁶ 10⁻³ 10⁰"),
+    ],
+)
+def test_ticks_are_as_many_as_their_texts_have_room_for(log, which, ends, length, found):
+    at = scales.ticks(Axis(log=log), which, ends, length)
+    assert [*at.values()] == found.split()
+    assert [*at] == sorted(at)
+
+
+RING = np.array([[1.0, 20.0], [3.0, 25.0], [2.0, 31.0]])
+TWO_BARS = Bars(*map(np.array, ([1.0, 4.0], [2.0, -3.0], [7.0, 5.0], [0.5, 1.0])), BLUE)
+CELLS = Field(np.array([1.0, 3.0, 5.0]), np.array([10.0, 14.0]), np.zeros((2, 3)), 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("mark", "log", "x_ends", "y_ends"),
+    [
+        (Rule(-3.0, True), False, (-4.5, -1.5), (0.0, 1.0)),
+        (Rule(-3.0, False), False, (0.0, 1.0), (-4.5, -1.5)),
+        (Span(2.0, 6.5, True, SKY), False, (1.775, 6.725), (0.0, 1.0)),
+        (Span(2.0, 6.5, False, SKY), False, (0.0, 1.0), (1.775, 6.725)),
+        (Span(2.0, math.inf, False, SKY), False, (0.0, 1.0), (1.0, 3.0)),
+        (Area((RING, RING - 1.0), BLUE), False, (-0.15, 3.15), (18.4, 31.6)),
+        (TWO_BARS, False, (-3.5, 7.5), (0.5625, 4.6875)),
+        (replace(TWO_BARS, upright=True), False, (0.5625, 4.6875), (-3.5, 7.5)),
+        (CELLS, False, (0.0, 6.0), (8.0, 16.0)),
+        (Rule(4.0, True), True, (4.0 / 3.0 * 9.0**-0.05, 12.0 * 9.0**0.05), (1.0, 10.0)),
+        (Line(np.array([2.0]), np.array([-2.0])), False, (1.0, 3.0), (-3.0, -1.0)),
+        (Line(np.array([2.0, 3.0]), np.array([0.1, 10.0])), True, (2 / 1.5**0.05, 3 * 1.5**0.05), (0.0794328, 12.5893)),
+    ],
+)
+def test_the_limits_of_each_kind_of_mark_are_those_of_its_own_axis(mark, log, x_ends, y_ends):
+    found = [scales.limits(Axis(log=log), which, [Panel(0, 0, marks=[mark])]) for which in "xy"]
+    empty = [(1.0 * 10.0**-0.05, 10.0**1.05) if log else (-0.05, 1.05), (1.0, 10.0) if log else (0.0, 1.0)]
+    wanted = [empty[0] if ends == empty[1] else ends for ends in (x_ends, y_ends)]
+    assert found == [pytest.approx(ends, rel=1e-5, abs=1e-9) for ends in wanted]
+
+
+def test_the_limits_of_arms_on_a_logarithmic_axis_and_of_one_end_that_is_set():
+    line = Line(np.array([1.0, 1e3]), np.array([2.0, 3.0]), x_arms=np.array([[0.5, 2e3], [1.0, 3.0]]))
+    panels = [Panel(0, 0, marks=[line])]
+    wide = 1003.0 / 0.5
+    assert scales.limits(Axis(log=True), "x", panels) == pytest.approx((0.5 * wide**-0.05, 1003.0 * wide**0.05))
+    assert scales.limits(Axis(log=True, low=-1.0, high=1e4), "x", panels) == pytest.approx((0.5 * wide**-0.05, 1e4))
+    assert scales.limits(Axis(low=-9.0), "x", panels) == pytest.approx((-9.0, 1003.0 + 0.05 * 2003.0))
+
+
+@pytest.mark.parametrize(
+    ("log", "ends", "values", "found"),
+    [
+        (False, (2.0, 10.0), "2 4 10 12", "0 0.25 1 1.25"),
+        (False, (10.0, 2.0), "2 4 10", "1 0.75 0"),
+        (True, (1.0, 1e4), "1 100 1e4 0.1", "0 0.5 1 -0.25"),
+        (True, (1e4, 1.0), "10 1e4", "0.75 0"),
+        (True, (1.0, 10.0), "0 -5", "-300 -300"),
+    ],
+)
+def test_a_place_on_an_axis_goes_from_its_first_end_to_its_last(log, ends, values, found):
+    at = scales.place(Axis(log=log), np.array(values.split(), dtype=float), ends)
+    np.testing.assert_allclose(at, np.array(found.split(), dtype=float), atol=1e-12)
+
+
+def test_ticks_between_stand_on_a_turned_axis_too():
+    assert scales.minor(Axis(log=True), (30.0, 2.0)) == [2, 3, 4, 5, 6, 7, 8, 9, 10, 20, 30]
+
+
+@pytest.mark.parametrize(
+    ("share", "colour"),
+    [(-1.0, "#00224e"), (0.03, "#00285b"), (0.5, "#7d7c78"), (0.77, "#c1b269"), (1.0, "#fee838"), (2.0, "#fee838")],
+)
+def test_a_colour_between_two_of_the_table_is_mixed_of_them(share, colour):
+    assert colour_at(share) == colour
+
+
+def test_points_of_a_long_curve_are_kept_by_stretch_in_each_way():
+    x, y = np.geomspace(1.0, 1e3, 20), np.sin(1.3 * np.arange(20.0))
+    assert thinned_by_logarithm(x, y, 4).tolist() == [0, 1, 4, 6, 8, 11, 13, 16, 18, 19]
+    assert thinned(x, y, 8).tolist() == [0, 1, 4, 6, 8, 16, 18, 19]
+    broken = np.insert(x, 10, math.nan), np.append(y, 0.0)
+    assert thinned(*broken, 9).tolist() == [0, 4, 6, 9, 10, 11, 18, 20]
+
+
+def boxes_of(found):
+    """Boxes of the panels and places of the legends, to a hundredth of a point."""
+    boxes = [[*each.inner, *each.outer, *(each.bar or ())] for each in found.placed]
+    return [[round(n, 2) for n in box] for box in [*boxes, *([k.x, k.y, k.width, k.height] for k in found.keys)]]
+
+
+def two_rows(place, sheets_place=None, **more):
+    """A panel over two columns above two of unlike titles, one with a colour bar, with a legend in one of them."""
+    sheet = Sheet(6.0, 5.0, (2.0, 1.0), (3.0, 1.0), **more)
+    wide, left, right = sheet.panel(0, 0, 2), sheet.panel(1, 0), sheet.panel(1, 1)
+    wide.add(Line(X, Y, BLUE, label="one"), Line(X, Y, VERMILION, label="another\none"))
+    left.add(Line(X, 1e3 * Y, label="three"))
+    right.add(Field(X, Y, np.arange(9.0).reshape(3, 3), -3.0, 8.0, title="margin (dB)"))
+    wide.title, wide.title_size, wide.y.title, left.x.title = "a title", 12.0, "rms (rad)", "time (s)"
+    wide.legend = Legend(place, 2, title="by kind")
+    sheet.legend = Legend(sheets_place) if sheets_place else None
+    return sheet
+
+
+@pytest.mark.parametrize(
+    ("place", "sheets_place", "more", "found"),
+    [
+        (
+            "above",
+            None,
+            {},
+            """
+            37.7 56.52 374.18 220.97 3 3 381.38 238.27
+            37.7 243.67 275.47 325.9 8.16 238.27 282.67 357
+            294.93 243.67 374.18 325.9 282.67 238.27 429 343.2 383.18 243.67 394.18 325.9
+            150.9 3 110.08 33.12
+            """,
+        ),
+        (
+            "below",
+            None,
+            {},
+            """
+            37.7 20.4 374.18 184.85 3 3 381.38 238.27
+            37.7 243.67 275.47 325.9 8.16 238.27 282.67 357
+            294.93 243.67 374.18 325.9 282.67 238.27 429 343.2 383.18 243.67 394.18 325.9
+            150.9 205.15 110.08 33.12
+            """,
+        ),
+        (
+            "upper left",
+            "below",
+            {},
+            """
+            37.7 20.4 374.18 175.49 3 3 381.38 192.79
+            37.7 198.19 275.47 275.74 8.16 192.79 282.67 306.84
+            294.93 198.19 374.18 275.74 282.67 192.79 429 293.04 383.18 198.19 394.18 275.74
+            43.7 23.4 110.08 33.12
+            187.9 312.84 56.2 44.16
+            """,
+        ),
+        (
+            "lower left",
+            "right",
+            {},
+            """
+            37.7 20.4 308.98 208.93 3 3 316.18 226.23
+            37.7 231.63 227.47 325.9 8.16 226.23 233.47 357
+            245.73 231.63 308.98 325.9 233.47 226.23 363.8 343.2 317.98 231.63 328.98 325.9
+            43.7 172.81 110.08 33.12
+            372.8 9 56.2 44.16
+            """,
+        ),
+        (
+            "lower right",
+            "lower right",
+            {"heading": "a heading\nof two"},
+            """
+            37.7 45 308.98 217.13 3 27.6 316.18 234.43
+            37.7 239.83 227.47 325.9 8.16 234.43 233.47 357
+            245.73 239.83 308.98 325.9 233.47 234.43 363.8 343.2 317.98 239.83 328.98 325.9
+            192.9 181.01 110.08 33.12
+            372.8 312.84 56.2 44.16
+            """,
+        ),
+        (
+            "upper right",
+            "above",
+            {"heading": "a heading", "share_x": True, "share_y": True},
+            """
+            46.34 84.36 374.18 239.79 3 66.96 380.18 242.79
+            46.34 248.19 285.47 325.9 16.8 242.79 291.47 357
+            294.47 248.19 374.18 325.9 291.47 242.79 429 343.2 383.18 248.19 394.18 325.9
+            258.1 87.36 110.08 33.12
+            187.9 16.8 56.2 44.16
+            """,
+        ),
+    ],
+)
+def test_panels_bars_and_legends_of_each_place_share_the_sheet(place, sheets_place, more, found):
+    boxes = boxes_of(layout(two_rows(place, sheets_place, **more)))
+    assert boxes == [pytest.approx([float(n) for n in row.split()], abs=0.011) for row in found.strip().splitlines()]
+
+
+def test_strokes_and_contours_are_one_curve_with_gaps():
+    strokes = segments(np.array([1.0, 4.0]), np.array([-2.0, 3.0]), np.array([5.0, 7.0]), BLUE, 1.25)
+    np.testing.assert_equal(strokes.x, [1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
+    np.testing.assert_equal(strokes.y, [-2.0, 5.0, math.nan, 3.0, 7.0, math.nan])
+    assert (strokes.colour, strokes.width, strokes.whole) == (BLUE, 1.25, True)
+    x, y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([10.0, 14.0])
+    z = np.array([[0.0, 4.0, 0.0, 8.0], [0.0, 4.0, 0.0, 8.0]])
+    a, b = contour(x, y, z, 2.0)
+    assert np.isnan(a).tolist() == np.isnan(b).tolist() == [False, False, True, False, False, True, False, False]
+    assert sorted(np.round(a[np.isfinite(a)], 9).tolist()) == [0.5, 0.5, 1.5, 1.5, 2.25, 2.25]
+    assert sorted(b[np.isfinite(b)].tolist()) == [10.0, 10.0, 10.0, 14.0, 14.0, 14.0]
+    assert [each.size for each in contour(x, y, z, 99.0)] == [0, 0]
+
+
+def test_the_region_between_two_levels_has_a_ring_around_it_and_one_around_its_hole():
+    at = np.arange(5.0)
+    z = np.hypot(*(np.meshgrid(at - 2.0, 1.5 * (at - 2.0))))
+    rings = region(at, 10.0 * at, z, 0.5, 1.0)
+    areas = [0.5 * abs(float(np.sum(r[:-1, 0] * r[1:, 1] - r[1:, 0] * r[:-1, 1]))) for r in rings]
+    # linear between the nodes: corners at 1 and 2/3 of a cell, and at half of that
+    assert sorted(areas) == pytest.approx(sorted([2.0 * 10.0 * 2.0 / 3.0, 0.25 * 2.0 * 10.0 * 2.0 / 3.0]), rel=1e-9)
+    assert all(np.array_equal(ring[0], ring[-1]) for ring in rings)
+
+
+def test_an_area_and_stairs_of_unlike_values():
+    x, low, high = np.array([0.0, 1.0, 3.0, 4.0]), np.array([1.0, 2.0, math.nan, 5.0]), np.array([6.0, 7.0, 8.0, 9.5])
+    area = between(x, low, high, SKY, 0.4, "band")
+    assert [ring.tolist() for ring in area.rings] == [[[0, 1], [1, 2], [1, 7], [0, 6]], [[4, 5], [4, 9.5]]]
+    assert (area.colour, area.opacity, area.label) == (SKY, 0.4, "band")
+    bars, outline = stairs(np.array([1.0, 2.0, 5.0]), np.array([3.0, 7.0]), SKY, GREY)
+    assert [each.tolist() for each in (bars.at, bars.start, bars.end, bars.breadth)] == [
+        [1.5, 3.5],
+        [0, 0],
+        [3, 7],
+        [1, 3],
+    ]
+    assert [outline.x.tolist(), outline.y.tolist()] == [[1, 1, 2, 2, 5, 5], [0, 3, 3, 7, 7, 0]]
+    assert (bars.colour, bars.upright, outline.colour, outline.width) == (SKY, True, GREY, 0.8)
+    sheet, panels = grid(3.0, 2.0, 2, 3, share_y=True)
+    assert [(panel.row, panel.column) for panel in panels] == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]
+    assert (sheet.width, sheet.height, len(sheet.heights), len(sheet.widths), sheet.share_y) == (3.0, 2.0, 2, 3, True)
+    axis = rows(("first", "second", "third"), 7.0)
+    assert (axis.low, axis.high, axis.words, axis.size, axis.grid) == (
+        2.6,
+        -0.6,
+        {0: "first", 1: "second", 2: "third"},
+        7.0,
+        False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("label", "lines"),
+    [
+        ("a: 1 / 2", ["a: 1 / 2"]),
+        ("x" * 44, ["x" * 44]),
+        ("x" * 45, ["x" * 44, "x"]),
+        (
+            "pointing error of the body: 300 urad rms / 600 urad rms about each axis of it",
+            ["pointing error of the body:", "300 urad rms /", "600 urad rms about each axis of it"],
+        ),
+        ("word " * 40 + ": 1", [" ".join(["word"] * 9), " ".join(["word"] * 8) + "…", "1"]),
+        (
+            "a long name of an assumption\n of two lines / the other",
+            ["a long name of an assumption of two lines /", "the other"],
+        ),
+    ],
+)
+def test_a_label_is_broken_behind_the_assumption_and_between_its_values(label, lines):
+    assert in_lines(label).split("\n") == lines
+
+
+def test_bars_of_swings_to_either_side_without_bound_and_without_value():
+    panel = Panel(0, 0)
+    ends = [(1.0, 5.0), (-math.inf, 2.5), (math.nan, 7.0), (math.inf, math.nan), (3.0, 3.0)]
+    swing_bars(panel, [f"row {k}" for k in range(5)], ends, 3.0)
+    bars = [
+        (*(float(each[0]) for each in (b.at, b.start, b.end, b.breadth)), b.colour, b.opacity)
+        for b in panel.all_of(Bars)
+    ]
+    assert bars == [
+        (0.0, 3.0, 1.0, 0.7, ORANGE, 1.0),
+        (0.0, 3.0, 5.0, 0.7, BLUE, 1.0),
+        (1.0, 3.0, 3.0 - 1.4 * 4.0, 0.7, ORANGE, 0.5),
+        (1.0, 3.0, 2.5, 0.7, BLUE, 1.0),
+        (2.0, 3.0, 7.0, 0.7, BLUE, 1.0),
+        (3.0, 3.0, 3.0 + 1.4 * 4.0, 0.7, ORANGE, 0.5),
+        (4.0, 3.0, 3.0, 0.7, ORANGE, 1.0),
+        (4.0, 3.0, 3.0, 0.7, BLUE, 1.0),
+    ]
+    assert [(w.text, w.x, w.y, w.colour, w.shift, w.of_panel) for w in panel.all_of(Words)] == [
+        (text, 1.0, row, GREY, (5.0, 0.0), "x")
+        for row, text in enumerate(
+            ("", "lower: without bound", "lower: no value", "lower: without bound, higher: no value", "no change")
+        )
+    ]
+    assert [(rule.at, rule.upright, rule.width) for rule in panel.all_of(Rule)] == [(3.0, True, 0.8)]
+    assert panel.y.words == {float(k): f"row {k}" for k in range(5)}
+    for value, shown in ((-2.0, -2.0 + 1.4 * 2.0), (0.0, 1.4)):  # without any swing that is finite
+        alone = Panel(0, 0)
+        swing_bars(alone, ["a"], [(math.inf, math.nan)], value)
+        assert [float(b.end[0]) for b in alone.all_of(Bars)] == [pytest.approx(shown)]
+    key = swing_legend("input", "below", 3)
+    assert [(e.label, e.colour) for e in key.only] == [("input lower", ORANGE), ("input higher", BLUE)]
+    assert (key.place, key.columns) == ("below", 3)
+
+
+def test_a_figure_of_an_odd_name_has_an_id_and_a_title_that_are_sound():
+    hatched = Area((RING,), BLUE, hatched=True)
+    figure = Figure("a b/c.é_1-2", 'says "x" & <y>', "", one(hatched), {"x (m)": np.array([1.23456, math.nan])})
+    assert figure.id == "a-b-c.-_1-2"
+    assert figure.labelled.startswith('<svg role="img" aria-label="says &quot;x&quot; &amp; &lt;y&gt;" ')
+    assert figure.labelled.count('id="a-b-c.-_1-2-1"') == 1 and 'fill="url(#a-b-c.-_1-2-1)"' in figure.labelled
+    assert figure.rows(3) == [("1.23",), ("",)]
+    assert (bool(figure.plot), figure.static.plot, figure.static.title) == (True, "", figure.title)
+    figure.take("<svg other", "{}")
+    assert (figure.svg, figure.plot) == ("<svg other", "{}")

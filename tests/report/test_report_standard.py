@@ -163,3 +163,69 @@ def test_the_table_keeps_to_its_width(study, found, width):
 def test_what_never_ends_is_none_in_json(study, found):
     never = replace(found, held=(replace(found.held[0], value=float("inf")), *found.held[1:]))
     assert finite(links_data(study, against=never))["standard"]["clauses"][0]["value"] is None
+
+
+# ------------------------------------------------------------------------------------- requirements unlike each other
+def asked(comparison, values=(), texts=(), unit="", distance_m=None, ratio=None, outside="", number="7.1"):
+    return compliance.Asked(
+        *("a_key", number, "3.1" if number else "", "a subject", "what it is", comparison, values, texts, unit),
+        *(distance_m, ratio, "a source", outside),
+    )
+
+
+ODD = [
+    compliance.Held(asked("at least", (2.5e-6,), ("2.5",), "W/m^2", 5.5e6), "meets", 3.1e-6, "", "by the budget"),
+    compliance.Held(asked("at most", (622.08e6,), ("622",), "bit/s", None, 1e-9), "does not meet", 622.09e6),
+    compliance.Held(asked("at least", (0.25,), (), "W", 1.2345e6, 2e-5), "not said", None, "", "say it"),
+    compliance.Held(asked("between", (1.53e-6, 1.565e-6), (), "m"), "meets", 1.5525e-6),
+    compliance.Held(asked("on the grid", (193.1e12, 1e11), (), "Hz"), "not said", 193.12e12),
+    compliance.Held(asked("one of", (), ("OOK", "DPSK"), number=""), "meets", None, "OOK"),
+    compliance.Held(asked(None, outside="no model of it"), "outside microrad", None, "", "no model of it"),
+    compliance.Held(asked("one of", (4.0, 8.0), ("4", "8")), "does not meet", 16.0),
+]
+TOLD = """
+at least 2.5 µW/m^2 at 5500 km | 3.1 µW/m^2
+at most 622.08 Mbit/s at a bit error ratio of 1e-09 | 622.09 Mbit/s
+at least 250 mW at 1234 km at a bit error ratio of 2e-05 | –
+1.53 µm to 1.565 µm | 1.55 µm
+193.1 THz + n × 100 GHz | 193 THz
+OOK, DPSK | OOK
+– | –
+4, 8 | 16
+"""
+
+
+def test_each_kind_of_requirement_is_told_with_where_it_is_asked():
+    assert [" | ".join(shown._texts(each)) for each in ODD] == TOLD.strip().splitlines()
+    odd = compliance.Compliance(replace(SDA, name="s", title="S", version="4.0", note="a note"), tuple(ODD))
+    said, table, _ = shown.standard_view(odd).blocks
+    assert said.startswith(
+        "Of 8 requirements that public sources print of it, up to version 4.0, 3 are met and 2 are not; the mission "
+        "does not say 2, and 1 "
+    )
+    assert [[str(cell) for cell in row] for row in table.rows[1:3]] == [
+        [
+            *("a subject", "7.1 (3.1)", "at most 622.08 Mbit/s at a bit error ratio of 1e-09", "622.09 Mbit/s", "FAIL"),
+            *("what it is", "", "a source"),
+        ],
+        [
+            *("a subject", "7.1 (3.1)", "at least 250 mW at 1234 km at a bit error ratio of 2e-05", "–", "not said"),
+            *("what it is", "say it", "a source"),
+        ],
+    ]
+    assert [str(row[1]) for row in table.rows[5:7]] == ["unknown here", "7.1 (3.1)"]
+    assert [len(row) for row in shown.short_view(odd).blocks[1].rows] == [5] * 8
+    rows = list(shown.standard_rows(odd))
+    begins = "at least 2.5 µW/m^2 at 5500 km: what it is"
+    assert rows[0] == ("S", "a subject", "3.1e-06", "W/m^2", begins, "7.1 (3.1); a source", "meets", "by the budget")
+    assert rows[5][2:6] == ("OOK", "", "OOK, DPSK: what it is", "unknown here; a source")
+    assert rows[6][2:] == ("", "", "what it is", "7.1 (3.1); a source", "outside microrad", "no model of it")
+    data = shown.standard_data(odd)
+    assert data["counts"] == {"meets": 3, "does_not_meet": 2, "not_said": 2, "outside_microrad": 1}
+    assert [data[key] for key in ("name", "title", "version", "note")] == ["s", "S", "4.0", "a note"]
+    assert data["clauses"][1] == {
+        **{"name": "a_key", "limits": [622.08e6], "texts": ["622"], "number": "7.1", "numbered_in": "3.1"},
+        **{"subject": "a subject", "asks": "what it is", "comparison": "at most", "unit": "bit/s", "distance_m": None},
+        **{"bit_error_ratio": 1e-9, "source": "a source", "value": 622.09e6, "text": ""},
+        **{"judgement": "does not meet", "why": ""},
+    }

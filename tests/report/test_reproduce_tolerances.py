@@ -196,3 +196,130 @@ def test_another_order_of_sums_stays_inside_and_a_per_mille_does_not(summary, of
 
     assert by(1e-12) == set()
     assert {tolerances.stated(place) for place in by(1e-3)} >= {"formula", "linear theory", "orbit"}
+
+
+# ---------------------------------------------------------------------------------------- steps unlike each other
+STEPS = tolerances.ConverterSteps(
+    step_rad=3e-8, runs=25, allowed_rad=8e-6, rms_rad=1.5e-6, full_rad=2.5e-6, run_db=0.02, runs_db=0.005,
+    rate_bit_s=622.08e6, acquisitions=800, days=16,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "relative", "distance"),
+    [
+        ("exact", 0.0, {}),
+        ("formula", 1e-8, {"dB": 1e-8, "dBm": 1e-8, "rad": 1e-12, "": 1e-12}),
+        ("linear theory", 1e-5, {"rad": 1e-12, "": 1e-5}),
+        ("searched", 1e-4, {"rad": 1e-12, "": 1e-5}),
+        ("run", 1e-6, {"rad": 6e-8}),
+        ("runs", 1e-6, {"rad": 1.2e-8}),
+        ("largest", 1e-6, {"rad": 1.2e-7}),
+        ("interval", 1e-6 + 0.1 / math.sqrt(50.0), {}),
+        ("gain", 1e-6, {"": 0.016}),
+        ("added", 1e-6, {"rad": 2.0 * math.sqrt(2.5e-6 * 1.2e-8)}),
+        ("fades", 0.25, {}),
+        ("drawn", 0.005, {"": 0.005}),
+        ("failed", 0.0, {"": 0.0625}),
+        ("volume", 1e-6 + 0.025, {"s": 10.0 * tolerances.TOLERANCE_S, "bit": 1e10 * tolerances.TOLERANCE_S}),
+        ("spectrum", 0.8, {}),
+        (
+            "link",
+            0.01,
+            {
+                **{"rad": 6e-8, "dB": 0.04, "bit/s": 622.08e6 * (10.0**0.004 - 1.0)},
+                "": math.sqrt(2.0 * 6e-8 / 8e-6) / math.pi,
+            },
+        ),
+        (
+            "orbit",
+            1e-8,
+            {
+                unit: 10.0 * tolerances.TOLERANCE_S * rate
+                for unit, rate in {"m": 8e3, "rad": 1e-3, "deg": 0.1, "Hz": 1e7, "bit": 1e9, "s": 1.0}.items()
+            },
+        ),
+    ],
+)
+def test_the_distances_of_each_kind_follow_from_steps_runs_and_draws(kind, relative, distance):
+    found = tolerances.tolerances(STEPS)[kind]
+    assert found.relative == pytest.approx(relative, rel=1e-12)
+    assert dict(found.distance) == pytest.approx(distance, rel=1e-12)
+    unit = next(iter(distance), "")
+    assert found.allowed(-4.0, 3.0, unit) == pytest.approx(4.0 * relative + distance.get(unit, 0.0))
+    assert found.allowed(3.0, -4.0, "no unit of it") == pytest.approx(4.0 * relative)
+
+
+@pytest.mark.parametrize(
+    ("place", "kind", "unit"),
+    [
+        ("links.acquisition.ways[1].simulated_mean_time_s", "drawn", "s"),
+        ("links.acquisition.ways[12].runs", "exact", ""),
+        ("links.acquisition.ways[0].mean_time_s", "formula", "s"),
+        ("performance[3].mean_fade_s", "fades", "s"),
+        ("performance[3].outage", "link", ""),
+        ("performance[3].data_rate_bit_s", "link", "bit/s"),
+        ("day.optical.contacts_without_acquisition", "failed", ""),
+        ("day.relay.latency_99_percent_s", "volume", "s"),
+        ("day.contacts[4].could_carry_bit", "volume", "bit"),
+        ("day.contacts[4].line_of_sight_rate_most_rad_s", "orbit", "rad/s"),
+        ("day.contacts[4].range_rate_most_m_s", "orbit", "m/s"),
+        ("contact.windows[0].largest_rad", "largest", "rad"),
+        ("contact.windows[0].lowest_margin_db", "link", "dB"),
+        ("contact.windows[0].range_m", "orbit", "m"),
+        ("constellation.stations[2].use", "volume", ""),
+        ("error_budget[1].mean_rad[0]", "linear theory", "rad"),
+        ("error_budget[1].limit_rad", "exact", "rad"),
+        ("error_budget[1].sources[2].may_be_times", "searched", ""),
+        ("fine_pointing.controllers[2].simulated.no hysteresis.axis_rms_rad[1]", "runs", "rad"),
+        ("fine_pointing.controllers[2].simulated.given.rms_interval_rad", "interval", "rad"),
+        ("fine_pointing.controllers[2].margins.crossover_hz", "linear theory", "Hz"),
+        ("fine_pointing.error_budget.differences[0].added_rms_rad", "added", "rad"),
+        ("fine_pointing.error_budget.together_without_hysteresis_rms_rad", "runs", "rad"),
+        ("fine_pointing.rms_left_to_gain.baseline_with_hysteresis", "gain", ""),
+        ("fine_pointing.stroke.x[0].margin_rad", "formula", "rad"),
+        ("margin_db.communication_static", "formula", "dB"),
+        ("margin_db.judged", "link", "dB"),
+        ("residual.used_rad", "run", "rad"),
+        ("runs[7].frequency_hz", "exact", "Hz"),
+        ("day.sky.correlation[0][1]", "formula", ""),
+        ("day.direct.contacts_s", None, "s"),
+        ("xday.duration_s", None, "s"),
+    ],
+)
+def test_a_number_has_the_kind_and_the_unit_of_its_place(place, kind, unit):
+    assert (tolerances.stated(place), tolerances.unit_of(place)) == (kind, unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("tornado-beacon", "formula"),
+        ("pointing-errors-spectrum", "linear theory"),
+        ("latency", "curve"),
+        ("tornado-", None),
+    ],
+)
+def test_the_data_of_a_figure_have_their_kind_by_its_whole_name(name, kind):
+    assert tolerances.stated_for_figure(name) == kind
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "same"),
+    [
+        ("peak −3.14 dB of 2 runs", "peak −3.15 dB of 2 runs", True),
+        ("peak 0.01 dB", "peak 0.02 dB", True),  # one in the last digit
+        ("peak 0.01 dB", "peak 0.03 dB", False),
+        ("100 contacts", "104 contacts", True),
+        ("100 contacts", "106 contacts", False),
+        ("2 runs", "3 runs", False),
+        ("1e-9 of it", "1.04e-9 of it", True),
+        ("1e-9 of it", "2e-9 of it", False),
+        ("4 % of A", "4 % of B", False),
+        ("a 1", "a 1 2", False),
+        ("-1.5 dB", "+1.5 dB", False),
+    ],
+)
+def test_a_sentence_is_the_same_up_to_roundings_of_its_numbers(was, now, same):
+    assert (compared.compare({"a": was}, {"a": now}, lambda *_: 0.0).differences == ()) is same
+    assert compared.compare({"a": was}, {"a": now}, None).differences != ()

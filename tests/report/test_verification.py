@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from drawn import plain as rounded
+from microrad.campaign.rows import sampling
 from microrad.campaign.statistics import sensitivity, tails
 from microrad.core import integrity
 from microrad.core.kept import Kept
@@ -27,9 +28,12 @@ from microrad.core.units import format_quantity
 from microrad.lab.identify import records
 from microrad.lab.identify.linear import fit, uncertainty
 from microrad.lab.identify.selection import warnings
-from microrad.link import gains
+from microrad.link import gains, variation
 from microrad.link import study as link_study
 from microrad.link.acquisition import partner_search, sequence
+from microrad.link.compliance import judge
+from microrad.link.fade_series import coded
+from microrad.link.pointing import fading
 from microrad.link.requirement import Requirement
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mission.file import load_link, load_mission
@@ -2156,3 +2160,506 @@ def test_anchors_are_given_and_made_and_none_twice():
     assert taken == {"part", "one-two", "one-two-2", "one-two-2-2", "one-two-3", "part-2", "part-3"}
     assert [slug("A/b  (c)"), slug("é")] == ["a-b-c", "part"]
     assert told("", None, "x", Points([]), Points(["y"])) == ("x", Points(["y"]))
+
+
+# ------------------------------------------------------------- the evidence by its sums, each unit and reason by itself
+EVIDENCE = """
+flown-orbits | deg | 3 | 590.22 | 0.3 | 0.1 deg: 10 km of altitude, which is a mean
+sgp4 |  | 1 | 27 | 0 | a count
+sgp4 | m | 1 | 0 | 0.001 | 1 mm: digits of the tables, summed
+sgp4 | m/s | 1 | 0 | 1e-05 | as the places
+ecss-example | arcsec | 2 | 30.73 | 0.0202 | 1 in the last digit: its parts are printed w
+ecss-example |  | 3 | 16.82 | 0.015 | half of the last printed digit
+ideal-receivers | photon/bit | 4 | 125.1 | 0.02 | half of the last printed digit
+ideal-receivers |  | 1 | 0.81453 | 5e-06 | half of the last printed digit
+mathworks-link | dB | 3 | -468.096 | 0.00015 | half of the last printed digit
+liang-link | dB | 1 | 3 | 0.005 | half of the last printed digit
+clear-sky |  | 1 | 37.92 | 0.005 | half of the last printed digit
+clear-sky | dB | 1 | 0.4576 | 0.0002 | 0.04 %: by the formula the zenith has an air
+avalanche |  | 3 | 110.166 | 0.0105 | half of the last printed digit
+spinning-satellite |  | 1 | 0.3754 | 0.0011 | 0.3 %: the published bounds are 0.2 % apart
+random-numbers |  | 3 | 0 | 0 | exact
+budgets | dBm | 9 | -1866.42 | 4.98332e-07 | rounding of a sum of a dozen decibels
+budgets | dB | 32 | -4345.87 | 1.52877e-06 | rounding of a sum of a dozen decibels
+budgets | W | 6 | 1.58651e-08 | 1.00736e-17 | rounding of a sum of a dozen decibels
+budgets | W/m^2 | 9 | 1.45185e-05 | 4.41706e-15 | rounding of a sum of a dozen decibels
+budgets | W/sr | 3 | 6.48815e+09 | 4.15401 | rounding of a sum of a dozen decibels
+budgets | photon/bit | 1 | 167.583 | 1.67583e-07 | rounding of a sum of a dozen decibels
+budgets | bit/s | 1 | 3.31542e+08 | 0.331542 | rounding of a sum of a dozen decibels
+standard | W/m^2 | 5 | 0.000140484 | 6.56968e-14 | rounding of a sum of a dozen decibels
+standard | W | 1 | 3.99917 | 3.99917e-09 | rounding of a sum of a dozen decibels
+standard | rad | 1 | 2.32364e-05 | 2.32364e-14 | rounding of a sum of a dozen decibels
+far-field | dB | 5 | 1564.39 | 5e-06 | error of the quadrature
+coupling | dB | 5 | 49.9438 | 9.51696e-05 | 1e-6 of the light: a spline between angles
+coupling | dB | 1 | 5.85525 | 0.005 | 0.005 dB: steps of the errors
+tornado | dB | 26 | 1195.77 | 8.89232e-08 | rounding of a sum of a dozen decibels
+under-errors | rad | 1 | 1.09302e-05 | 1.09302e-14 | rounding of a sum of a dozen decibels
+under-errors | dB | 68 | -351.616 | 6.8e-08 | rounding of a sum of a dozen decibels
+under-errors | bit/s | 65 | 2.8894e+11 | 28.1922 | rounding of a sum of a dozen decibels
+under-errors | m | 1 | 5.48249e+07 | 0.0548249 | rounding of a sum of a dozen decibels
+tracking | A | 4 | 2.60467e-11 | 7.46653e-21 | rounding of a sum of a dozen decibels
+tracking | W | 1 | 5.71212e-10 | 5.71212e-19 | rounding of a sum of a dozen decibels
+tracking |  | 1 | 106.695 | 1.06695e-07 | rounding of a sum of a dozen decibels
+tracking | rad | 1 | 1.71147e-07 | 1.71147e-16 | rounding; Tyler and Fried 1982 without a gap
+point-ahead | rad | 2 | 0.000355246 | 2.13147e-08 | 2 v / c against the exact aberration: v / c
+point-ahead |  | 1 | 3.60012 | 0.000360012 | 2 v / c against the exact aberration: v / c
+point-ahead | dB | 1 | 144.266 | 0.0144266 | 2 v / c against the exact aberration: v / c
+solved | dB | 5 | 45 | 5e-06 | end of a search
+solved | dB | 5 | 596.058 | 5e-09 | rounding of a sum of a dozen decibels
+margin-map | dB | 25 | -2229.01 | 2.5e-08 | rounding of a sum of a dozen decibels
+fall | dB | 8 | 195.293 | 0.190262 | 10 % of the fall: its quantile is of 64 runs
+uncoded | dB | 3 | 7.2311 | 0.03 | 0.01 dB: steps of the radius
+pointing-lines | rad | 4 | 0.000652 | 4.25e-16 | rounding of a sum of a dozen decibels
+coded-fades | dB | 6 | 51.3401 | 0.06 | 0.01 dB: the union bound at an error ratio o
+coded-fades | dB | 1 | 3.43417 | 1e-09 | rounding
+coded-fades |  | 3 | 0.42 | 2.001e-09 | a count
+coded-fades |  | 1 | 1.27379e-07 | 6.36895e-09 | 5 %: the union bound, of which the simulated
+coded-fades | s | 4 | 0.0154333 | 4e-12 | rounding
+coded-fades | 1/s | 1 | 150 | 1e-09 | a count
+ground-link | m | 8 | 9.31137e+06 | 2.66311 | 1e-6 of it: nodes fixed beforehand against a
+ground-link | rad | 4 | 0.000210689 | 7.23209e-11 | 1e-6 of it: nodes fixed beforehand against a
+ground-link |  | 8 | 1.53391 | 5.18403e-07 | 1e-6 of it: nodes fixed beforehand against a
+ground-link | dB | 4 | 5.61916 | 2.54439e-06 | 1e-6 of it: nodes fixed beforehand against a
+ground-link | dB | 2 | 1.40757 | 0.0110307 | five standard deviations of the quantile of
+ground-link | rad | 1 | 4.29085e-06 | 4.29085e-09 | 0.1 %: the printed constant has three digits
+hufnagel-valley | m | 1 | 0.049606 | 5e-07 | half a unit in the last printed digit
+hufnagel-valley | rad | 1 | 6.894e-06 | 5e-10 | half a unit in the last printed digit
+andrews-phillips | rad | 1 | 1.35e-05 | 5e-08 | half a unit in the last printed digit
+andrews-phillips |  | 2 | 0.27 | 0.01 | half a unit in the last printed digit
+andrews-phillips | m | 1 | 0.1124 | 0.000562 | 0.5 %: the book's constant is 0.42 where our
+itu-r-p1622 |  | 8 | 6.05 | 0.06176 | half a unit in the last printed digit, and 1
+liang-ground | dB | 1 | -256.354 | 0.009 | half a unit in the last printed digit, and 0
+liang-ground | m | 1 | 549000 | 500 | half a unit in the last printed digit
+pointing-totals | rad | 8 | 0.00322864 | 5.30891e-12 | rounding
+pointing-totals | rad | 1 | 0.000345883 | 5.01536e-07 | five standard errors of 4e+06 draws
+pointing-totals |  | 1 | 0.982188 | 0.000330671 | five standard errors of 4e+06 draws
+pointing-totals | rad | 4 | 0.00248477 | 1.07947e-09 | end of a search
+acquisition |  | 2 | 2.99989 | 0.0025 | five standard errors of 4000 runs
+acquisition | s | 4 | 164.081 | 0.985046 | five standard errors of 4000 runs
+scan | rad | 2 | 0.00113284 | 6.41836e-13 | rounding
+scan | s | 1 | 0.954214 | 0.00954214 | 1 %: the first turn is no ring
+jitter | dB | 3 | 131.842 | 0.754979 | five standard errors of 4e+06 draws
+jitter |  | 2 | 0.920376 | 0.030564 | five standard errors of 4e+06 draws, and wha
+jitter | rad | 1 | 3.43268e-05 | 1.90601e-07 | five standard errors of 4e+06 draws
+jitter | rad | 4 | 4e-05 | 4e-15 | rounding
+fades | 1/s | 1 | 35.8587 | 1.44907 | five standard errors of 400 drawn motions, a
+fades | s | 1 | 0.0102779 | 0.000415335 | five standard errors of 400 drawn motions, a
+seen |  | 8 | 28.3119 | 0.00457813 | five standard errors of 2e+06 draws
+scan-light | rad | 2 | 8.37294e-05 | 5.58196e-14 | rounding
+scan-light | s | 2 | 7.71947e-08 | 5.14631e-17 | rounding
+stages | s | 42 | 1128.23 | 6.07883e-08 | rounding
+stages |  | 42 | 824.635 | 0.00841243 | five standard errors of 2e+06 draws
+stages |  | 4 | 7.19228 | 0.00766954 | what its chances may be off: five standard e
+papers-loop | rad | 2 | 8.14011e-05 | 5.73712e-07 | 1 %: a loop of 50 kHz against one in continu
+papers-loop | rad | 8 | -0.00274316 | 8.00189e-06 | 3 % of the largest error: a loop of 50 kHz,
+limits |  | 2 | 1.40967 | 0.02 | 0.01: a loop gain below 1 %, and the first s
+hysteretic-loop | rad | 1 | 1.93286e-06 | 8.33272e-08 | 2 % for quantisation and slow body motion, a
+hysteretic-loop | rad | 1 | 4.94878e-06 | 2.47439e-07 | 5 %: the tail of 64 runs of 2 s
+loops |  | 3 | 0.584028 | 0.000233947 | 0.1 %: both sample a loop at finitely many p
+loops | rad | 3 | 0.000309576 | 1.24019e-07 | 0.1 %: both sample a loop at finitely many p
+margins |  | 10 | 33.0633 | 0.0601907 | 1 %: 40 001 frequencies
+margins | Hz | 10 | 32173.2 | 45.9098 | 1 %: 40 001 frequencies
+margins | rad | 5 | 17.0537 | 0.0356389 | second-order error of a plant step in L, by
+margins | s | 5 | 0.00790987 | 3.7265e-05 | second-order error of a plant step in L, by
+margins | dB | 5 | 95.3284 | 0.5 | 0.1 dB: 40 001 frequencies
+residuals | rad | 10 | 3.73307e-05 | 1.46787e-07 | 2 %: vibration within a period
+residuals | rad | 5 | 1.95051e-05 | 1.31802e-07 | 2 %, as of its parts
+residuals | rad | 5 | 1.95051e-05 | 1.80749e-07 | 2 %, and five standard errors of 64 runs
+room |  | 4 | 2.05884 | 4e-09 | rounding
+parameters | Hz | 6 | 8251.2 | 2.2418 | 0.1 %: printed with four digits
+spectra | rad^2/Hz | 25 | 2.00764e-13 | 7.45489e-16 | 4 %, twice that of an amplitude: vibration w
+spectra | rad^2 | 8 | 7.09264e-11 | 7.91354e-13 | 5 %: windows weigh the ends of a run less th
+contacts |  | 1 | 15 | 0 | a count
+contacts | s | 47 | 3.97968e+07 | 144 | 3 s: mean Sun, turn of the Earth, straight l
+contacts | m | 30 | 1.90808e+10 | 6.12273e+06 | 0.5 %: 3 s at the ends, J2 in the motion
+contacts | rad | 15 | 0.00731616 | 4.55867e-06 | 0.5 %: 3 s at the ends, J2 in the motion
+contacts | rad/s | 15 | 0.0286892 | 1.79938e-05 | 0.5 %: 3 s at the ends, J2 in the motion
+contacts | rad/s^2 | 15 | 2.65472e-05 | 1.66549e-08 | 0.5 %: 3 s at the ends, J2 in the motion
+contacts | m/s | 15 | 680869 | 438.236 | 0.5 %: 3 s at the ends, J2 in the motion
+contacts | Hz | 15 | 4.3927e+11 | 2.82733e+08 | 0.5 %: 3 s at the ends, J2 in the motion
+contacts | bit | 15 | 1.31975e+14 | 4.91019e+10 | 0.3 %: 3 s of a contact, drawn acquisitions
+contacts | s | 1 | 54798.4 | 30 | 30 s: 15 contacts
+contacts |  | 1 | 0.634241 | 0.000347222 | 30 s of a day
+contacts | s | 1 | 3403.28 | 3.40328 | 0.1 %: with or without the Earth's flattenin
+passes |  | 1 | 10 | 0 | a count
+passes | s | 30 | 1.94667e+07 | 90 | 3 s: mean Sun, turn of the Earth, straight l
+passes | rad | 10 | 24.8673 | 0.05 | 5 mrad: 3 s of a pass overhead
+passes | bit | 10 | 2.34776e+12 | 3e+09 | 3 s of a pass at its rate
+passes | s | 1 | 4537.82 | 20 | 20 s: ten passes
+passes | bit | 1 | 4.33782e+11 | 2e+09 | 20 s at the downlink's rate
+queue | s | 4 | 153671 | 162.383 | 10 s and 0.3 %: contacts begin up to 3 s apa
+queue | bit | 8 | 3.6288e+12 | 2.0736e+06 | a millionth of the day's data
+acquisitions-of-a-day | bit | 2 | 4.8556e+13 | 5.49311e+11 | within the extremes of 4000 days drawn anew
+acquisitions-of-a-day | bit | 2 | 3.17565e+13 | 6.52858e+12 | within the extremes of 4000 days drawn anew,
+acquisitions-of-a-day |  | 2 | 12.3994 | 2.22809 | five standard errors of the runs and of the
+rates | bit/s | 1 | 3e+08 | 0.3 | rounding
+rates | dB | 1 | 0.349727 | 3.49727e-10 | rounding
+rates | bit/s | 9 | 1.02e+10 | 0 | a step
+contact-run | s | 7 | 223.888 | 7e-09 | rounding of times of a day
+contact-run | s | 1 | 3160.06 | 6 | 3 s at either end of a contact that is searc
+contact-run | s | 7 | 57532.2 | 21 | 3 s: a contact searched anew
+contact-run | s | 16 | 220665 | 0.0096 | a sample
+contact-run | dB | 8 | 200.034 | 0.08 | 20 km of range in a window, 0.005 dB
+contact-run | dB | 8 | 0 | 0 | the lowest margin is above 0 dB
+contact-run |  | 1 | 0 | 0 | a count
+sessions |  | 13 | 2553 | 0 | a count
+sessions | bit | 13 | 3.93108e+14 | 603486 | rounding
+sessions | s | 12 | 1.00088e+06 | 1.2e-05 | rounding of times of a day
+sessions |  | 2 | 3 | 2e-09 | rounding
+travel | rad | 12 | 0.00941315 | 1.67105e-06 | 0.1 %: v / c
+travel | rad | 28 | 0.130833 | 2.9904e-05 | 0.1 % of the travel: v / c
+travel |  | 8 | 54.7718 | 0.016 | 0.1 % of the travel: v / c
+requirements | % | 2 | 104.655 | 1.96437e-07 | rounding
+requirements | dB | 6 | 106.523 | 3.44895e-08 | rounding
+requirements | rad | 4 | 0.000687923 | 4e-09 | rounding
+error-budget | rad | 4 | 6.63851e-06 | 5.37787e-08 | 2 %: 64 runs of 2 s
+error-budget | rad | 1 | 3.3847e-08 | 1.01541e-08 | 30 %: one slow swing in a run of 2 s
+error-budget | rad | 5 | -0.0006892 | 1.40717e-13 | rounding
+assumptions |  | 14 | 174.82 | 0.653817 | 2 %: the day as it is draws its acquisitions
+matrices | rad/V | 4 | 0.000715503 | 3.09848e-07 | 0.1 %: the drive is straight within a plant
+drawn-rows |  | 2 | 0 | 0.059516 | a distance that one set of draws in a millio
+drawn-rows |  | 3 | 2 | 0.178548 | twice a distance that one set of draws in a
+drawn-rows |  | 2 | 3 | 0 | exact
+drawn-rows |  | 2 | 0 | 0.00195312 | each of a block's strata has one row
+drawn-rows |  | 3 | 2 | 0.00585938 | twice each of a block's strata has one row
+drawn-rows | dB | 8 | 188.092 | 8e-09 | rounding
+campaign | dB | 4 | 45.3429 | 4e-09 | rounding
+campaign | dB | 23 | 1621.03 | 0 | a row
+campaign | dB | 2 | 6.32955 | 0.104792 | five standard errors of 1024 rows
+campaign |  | 1 | 0 | 0.0851449 | one set of rows in a million exceeds it
+campaign |  | 1 | 8.39372e-30 | 4.52686e-16 | five standard errors of 1024 rows
+tails |  | 1 | 0.0013499 | 0.000537148 | five standard errors of 1024 weighted rows,
+tails |  | 9 | 97.1753 | 0.885333 | five standard errors of 20000 weighted draws
+sensitivities |  | 6 | 5.98806 | 0.24522 | five standard errors of a share of n rows, 2
+sensitivities |  | 2 | 1.7469 | 0.0432089 | five standard errors of 16384 rows (Bonett a
+known-mirror | Hz | 3 | 2030 | 2.04893 | five standard errors, the least that any unb
+known-mirror | Hz | 3 | 1.16351 | 0.046132 | 10 %: five standard errors of a noise that i
+known-mirror |  | 2 | 0.07 | 0.00210037 | five standard errors, the least that any unb
+known-mirror |  | 2 | 0.00157551 | 8.10388e-05 | 10 %: five standard errors of a noise that i
+known-mirror | rad/V | 2 | 0.000299945 | 8.39902e-07 | five standard errors, the least that any unb
+known-mirror | rad/V | 1 | 8.39902e-08 | 8.39902e-09 | 10 %: five standard errors of a noise that i
+known-mirror | % | 1 | 94.9223 | 0.280505 | five standard errors of the rms of 16384 sam
+known-mirror | rad | 1 | 2e-06 | 9.0211e-08 | five standard errors of the rms of 6144 samp
+known-plays | V | 15 | 451.2 | 1.5e-08 | rounding
+known-plays | rad/V | 8 | 0.000255 | 4.58184e-06 | five standard errors of least squares; neigh
+known-plays | rad/V | 8 | 3.79062e-06 | 1.37455e-07 | 15 %: the rms of 6000 samples, their colour
+known-plays | rad | 1 | 0.000846771 | 1.07193e-05 | twice the largest noise of so many samples
+known-plays | V/s | 1 | 75.3982 | 0.150796 | 0.2 %: 99.5 % of the rates of a sine that ha
+known-plays | % | 1 | 0.117386 | 0.00551443 | five standard errors of the rms of 6000 samp
+known-plays | % | 3 | 2.22655 | 0.238196 | largest of 6000 normal numbers, at one in a
+known-plays | rad | 1 | 1.91667e-05 | 1.61515e-07 | five standard errors of a slope
+known-colour |  | 4 | 2.2972 | 0.170926 | five standard errors (Bartlett)
+known-colour |  | 3 | 0.392232 | 0.075 | five standard errors
+known-colour |  | 1 | 0.00979982 | 9.79982e-06 | 1.96
+known-colour |  | 2 | 0.15 | 0.308221 | five standard errors of 50
+"""  # check, unit, comparisons, sum of what is expected times its place, sum of the tolerances, how the reason begins
+
+
+@pytest.mark.parametrize("name", sorted({row.partition(" |")[0] for row in EVIDENCE.strip().splitlines()}))
+def test_the_evidence_expects_and_allows_what_it_did(everything, name):
+    wanted = [row.split(" | ") for row in EVIDENCE.strip().splitlines() if row.startswith(f"{name} |")]
+    (of,) = [o for o in everything.outcomes if o.check.name == name]
+    groups = {}
+    for each in of.comparisons:
+        groups.setdefault((each.unit, each.basis), []).append(each)
+    assert [(u, str(len(g)), b[:44].strip()) for (u, b), g in groups.items()] == [(r[1], r[2], r[5]) for r in wanted]
+    for row, group in zip(wanted, groups.values(), strict=True):
+        expected, tolerance = (
+            sum(place * c.expected for place, c in enumerate(group, 1)),
+            sum(c.tolerance for c in group),
+        )
+        assert (expected, tolerance) == (pytest.approx(float(row[3]), rel=1e-5), pytest.approx(float(row[4]), rel=1e-5))
+
+
+UNLIKE = {  # the shipped mission with values of the light that are all unlike each other
+    "pointing.lines.body_pointing.error": "240 urad",
+    "pointing.lines.orbit_knowledge.error": "37 urad",
+    "pointing.lines.misalignment.error": "81 urad",
+    "point_ahead.transverse_velocity": "9.3 km/s",
+    "point_ahead.error": "1.7 urad",
+    "fine_pointing.reference.point_ahead": "62 urad",
+    "terminals.leo_aperture": "6.3 cm",
+    "terminals.geo_aperture": "17.1 cm",
+    "beacon.transmit_power": "4.4 W",
+    "beacon.wavelength": "1.53 um",
+    "beacon.divergence": "840 urad",
+    "beacon.pointing_error": "270 urad",
+    "beacon.distance": "43100 km",
+    "beacon.transmit_optics_loss": "0.81 dB",
+    "beacon.receive_optics_loss": "1.13 dB",
+    "beacon.required_power": "11.3 pW",
+    "answer.transmit_power": "1.9 W",
+    "answer.wavelength": "1.064 um",
+    "answer.divergence": "46 urad",
+    "answer.pointing_error": "11.7 urad",
+    "answer.distance": "44700 km",
+    "answer.transmit_optics_loss": "0.57 dB",
+    "answer.receive_optics_loss": "0.73 dB",
+    "answer.required_power": "127 pW",
+    "communication.transmit_power": "6.7 W",
+    "communication.wavelength": "1.556 um",
+    "communication.pointing_error": "7.9 urad",
+    "communication.distance": "40300 km",
+    "communication.data_rate": "622.08 Mbit/s",
+    "communication.transmit_optics_loss": "0.88 dB",
+    "communication.receive_optics_loss": "1.21 dB",
+    "communication.tracking_split_loss": "0.39 dB",
+    "communication.implementation_loss": "2.3 dB",
+    "communication.receiver_sensitivity": "61 photon/bit",
+    "requirement.margin": "2.1 dB",
+    "requirement.pointing_error": "8.8 urad",
+    "acquisition.settle": "11.5 s",
+    "acquisition.detection": "12 ms",
+    "acquisition.detection_probability": "0.83",
+    "acquisition.detection_frames": "90",
+    "acquisition.response": "2.4 s",
+    "acquisition.measurement": "14 ms",
+    "acquisition.steering": "0.17 s",
+    "acquisition.lock": "1.3 s",
+    "acquisition.lock_probability": "0.91",
+    "acquisition.pointing_sigmas": "2.7",
+    "acquisition.attempts": "4",
+    "acquisition.sensor.responsivity": "0.93 A/W",
+    "acquisition.sensor.dark_current": "1.6 nA",
+    "acquisition.sensor.thermal_noise": "0.07 pA/sqrt(Hz)",
+    "acquisition.sensor.rate": "4.2 kHz",
+    "acquisition.scan.beam_radius": "23 urad",
+    "acquisition.scan.overlap": "0.31",
+    "acquisition.scan.coverage": "0.985",
+    "acquisition.scan.detection": "1.9 ms",
+    "acquisition.scan.turn": "1.4 ms",
+    "acquisition.scan.jitter": "4.1 urad",
+}
+
+
+@pytest.fixture(scope="module")
+def strange(tmp_path_factory):
+    """Documents of that mission."""
+    found = workspace.Workspace(tmp_path_factory.mktemp("unlike"), None)
+    stated = [value if value[-1].isdigit() else f'"{value}"' for value in UNLIKE.values()]
+    found.take(workspace.with_values(found.text, dict(zip(UNLIKE, stated, strict=True))))
+    return found
+
+
+@pytest.mark.parametrize(
+    "name",
+    (
+        *("budgets", "standard", "far-field", "coupling", "tornado", "tracking", "point-ahead", "solved"),
+        *("uncoded", "pointing-lines", "pointing-totals", "acquisition", "scan", "seen", "scan-light"),
+        *("stages", "jitter", "ground-link", "papers-loop", "loops", "matrices"),
+    ),
+)
+def test_the_evidence_holds_for_a_mission_of_which_no_two_values_are_alike(strange, name):
+    found = check.run(named(name), strange)
+    assert [found.trouble, found.absent] == ["", ""]
+    assert [(c.what, c.expected, c.obtained, c.tolerance) for c in found.comparisons if not c.holds] == []
+
+
+# ---------------------------------------------------------------------------------------------- names unlike each other
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        *(
+            ("a.point_ahead_most_rad", "rad"),
+            ("a.line_of_sight_rate_most_rad_s", "rad/s"),
+            ("a.range_rate_most_m_s", "m/s"),
+        ),
+        *(
+            ("a.acceleration_most_rad_s2", "rad/s^2"),
+            ("a.intensity_w_sr", "W/sr"),
+            ("a.power_w", "W"),
+            ("a.made_bit", "bit"),
+        ),
+        *(("a.doppler_most_hz", "Hz"), ("a.least_v", "V"), ("a.rms_percent", "%"), ("a.slope_v_per_rad", "V/rad")),
+        *(("a.cost_db_per_w", "dB/W"), ("a.least_m.0", "m"), ("loss_db.x", "dB"), ("db", ""), ("rad.x", ""), ("s", "")),
+        *(("a.turns_per_s", "1/s"), ("seconds_off", "s"), ("a_s.seconds_off.b_m", "m"), ("a_m.b.c", "")),
+    ],
+)
+def test_the_unit_is_that_of_the_last_part_or_of_the_one_above(name, unit):
+    assert registry.unit_of(name) == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("budgets.Beacon.lines.Transmit power.value", "Transmit power as a level | Beacon Transmit power"),
+        ("run.budgets.Communication_static.margin_db", "Link margin | Communication"),
+        ("budgets.Answer.totals.Margin.value", "Link margin | Answer Margin"),
+        ("budgets.Answer.received_power_w", "Received power | Answer"),
+        ("run.margin_db.static", "Link margin | Static"),
+        ("run.day.relay.volume_bit", "Session and volume of a constellation | relay"),
+        ("run.day.direct.could_carry_bit", "Volume that could be carried | direct"),
+        ("run.requirements.beacon covers its partner.actual", "Requirement: actual and to spare | beacon covers"),
+        ("run.requirements.beacon covers its partner.required", ""),
+        ("run.fine_pointing.controllers.LQG.margins.disk", "Disk margin"),
+        ("budget.tornado.communication.distance.low", ""),
+        ("x.nonsense", ""),
+    ],
+)
+def test_a_number_is_of_the_kind_of_its_quantity_and_line(name, kind):
+    assert registry.kind_of(name) == kind
+
+
+def test_records_of_a_list_go_by_the_first_key_that_tells_them_apart():
+    document = {
+        "rows": [{"name": "a", "x_m": 1.5, "ok": True}, {"name": "b", "x_m": 2.5, "unit": "W", "value": 7}],
+        "same": [{"name": "a", "x": 3.0}, {"name": "a", "x": 4.0}],
+        "bare": [[5.0, 6], 8.0],
+        "text": "9",
+    }
+    assert list(registry.placed(document)) == [
+        ("rows.a.x_m", "rows.0.x_m", 1.5),
+        ("rows.b.x_m", "rows.1.x_m", 2.5),
+        ("rows.b.value", "rows.1.value", 7.0),
+        ("same.0.x", "same.0.x", 3.0),
+        ("same.1.x", "same.1.x", 4.0),
+        ("bare.0.0", "bare.0.0", 5.0),
+        ("bare.0.1", "bare.0.1", 6.0),
+        ("bare.1", "bare.1", 8.0),
+    ]
+    assert dict(registry.flattened(document, "top"))["top.same.1.x"] == 4.0
+    assert registry.stated_units(document) == {"rows.b.value": "W"}
+    assert registry.unregistered(["a.margins.disk", "z.z", "budgets.Answer.margin_db"]) == ["z.z"]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "unit"),
+    [
+        ("terminals.leo_aperture", 0.05, "m"),
+        ("beacon.wavelength", 1.55e-6, "m"),
+        ("beacon.distance", 44e6, "m"),
+        ("beacon.divergence", 780e-6, "rad"),
+        ("beacon.required_power", 1e-11, "W"),
+        ("orbit.leo.limits.slew_limit", math.radians(0.5), "rad/s"),
+        ("orbit.leo.limits.sun_exclusion", math.radians(5.0), "rad"),
+        ("point_ahead.transverse_velocity", 10650.0, "m/s"),
+        ("operations.store", 128 * 8e9, "bit"),
+        ("communication.data_rate", 3e8, "bit/s"),
+        ("communication.receiver_sensitivity", 76.0, "photon/bit"),
+        ("communication.implementation_loss", 3.0, "dB"),
+        ("constellation.session", 600.0, "s"),
+        ("orbit.duration", 86400.0, "s"),
+        ("acquisition.detection", 0.01, "s"),
+        ("fine_pointing.delay", 2e-4, "s"),
+        ("control.rate", 5e4, "Hz"),
+        ("acquisition.sensor.dark_current", 1e-9, "A"),
+        ("acquisition.sensor.thermal_noise", 5e-14, "A/sqrt(Hz)"),
+        ("acquisition.sensor.responsivity", 1.0, "A/W"),
+        ("control.drive_resolution", 0.305e-3, "V"),
+        ("control.sensor_resolution", 2.7e-8, "rad"),
+        ("control.proportional", 1000.0, "V/rad"),
+        ("control.integral", 1.6e7, "V/(rad s)"),
+        ("mirror.rate_limit", 3770.0, "V/s"),
+        ("mirror.bouc_wen.d1", 8.9e-5, "rad/V"),
+        ("mirror.bouc_wen.delta", 4.7e-4, "s/V"),
+        ("mirror.bouc_wen.alpha", 38.421, "1/V"),
+    ],
+)
+def test_the_second_table_of_units_has_each_unit_of_the_mission(tmp_path_factory, key, value, unit):
+    text = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
+    given = workspace.Given(text)
+    assert (given(key), given.unit(key)) == (pytest.approx(value, rel=1e-12), unit)
+
+
+def test_the_domain_of_two_unlike_records_spans_both():
+    time = np.arange(960) / 480.0
+    one = recording_of(
+        np.column_stack([3.0 * np.sin(2 * np.pi * 30.0 * time) + 1.0, 0.0 * time]),
+        np.column_stack([2.0 * np.cos(2 * np.pi * 30.0 * time), 0.25 * np.cos(2 * np.pi * 30.0 * time)]),
+        480.0,
+        480,
+    )
+    fast = np.sin(2 * np.pi * 7.0 * np.arange(1050) / 900.0)[:, None]
+    two = recording_of(0.75 * fast, 5.0 * fast, 900.0, 900)  # a sixth of its second period: cut off
+    found = recorded.extents([one, two], 1e-3)
+    assert [(found[key]["unit"], found[key]["least"], found[key]["most"]) for key in found] == [
+        ("V", 0.0, 3.0),
+        ("Hz", 7.0, 30.0),
+        ("Hz", 480.0, 900.0),
+        ("m", 5e-4, pytest.approx(0.01, rel=1e-3)),
+    ]
+
+
+def test_every_occurrence_of_an_installation_in_which_all_goes_wrong():
+    said = [(each.letter, each.found) for each in warned.warnings(unlike())]
+    assert [letter for letter, _ in said] == sorted(letter for letter, _ in said)
+    for letter, begins in (
+        ("a", "Tolerances of comparisons are the only criteria."),
+        ("b", "Not assessed: an installation has no mission."),
+        ("c", "Of an installation none."),
+        ("d", "c4 did not run: "),
+        ("e", "No use was assessed."),
+        ("f", "Recordings are not at hand for c5."),
+        ("g", "None was granted: there is no authority that could. Not met are M&S "),
+        ("h", "Defects are known here by comparisons that fail."),
+    ):
+        assert [1 for of, text in said if of == letter and text.startswith(begins)] == [1], (letter, begins)
+
+
+@pytest.mark.parametrize(
+    ("counts", "holds", "whole", "measured", "published", "levels", "said"),
+    [
+        ((3, 4, 2, 1), True, True, 5, 6, (1, 1, 1, 0, 2), "7 of 10 printed"),
+        ((3, 4, 0, 0), True, True, 0, 6, (1, 2, 1, 0, 2), "7 of 7 printed"),
+        ((3, 4, 0, 0), True, False, 0, 0, (1, 1, 0, 0, 2), "7 of 7 printed"),
+        ((3, 4, 0, 0), False, True, 5, 6, (1, 0, 0, 0, 2), "7 of 7 printed"),
+    ],
+)
+def test_the_capability_has_its_five_levels_and_counts(counts, holds, whole, measured, published, levels, said):
+    of = dict(zip((Status.VALIDATED, Status.VERIFIED, Status.TRACED, Status.NONE), counts, strict=True))
+    found = credibility.factors({**dict.fromkeys(Status, 0), **of}, holds, whole, measured, published)
+    assert tuple(each.level for each in found) == (*levels, 0, 1, 1, 2, 0, 2)
+    argued = {each.name: each for each in found}
+    rationale = next(
+        getattr(argued["Verification"], f)
+        for f in argued["Verification"].__slots__
+        if "printed" in str(getattr(argued["Verification"], f))
+    )
+    assert rationale.startswith(said) and f"{sum(counts) - counts[0] - counts[1]} are not." in rationale
+    assert ("Some of that evidence failed." in rationale) is not holds
+    assert ("not the recorded ones" in rationale) is not whole
+    assert any(
+        f"output ({published}) and with measurements ({measured})" in str(getattr(argued["Validation"], f))
+        for f in argued["Validation"].__slots__
+    )
+
+
+def test_what_an_input_moves_is_found_by_its_largest_factor_or_else_by_its_smallest():
+    given = {"a.margins.disk": 1.0, "budgets.Beacon.margin_db": 2.0, "budgets.Answer.margin_db": 0.0, "z.z": 5.0}
+    sweep = sweeps.Sweep("p", (), {"x.up": (0.25, 32.0), "x.down": (1 / 1024, 243.0), "x.none": (0.5, 2.0)}, 3)
+    asked, told = [], []
+
+    def numbers_of(key, factor):
+        asked.append((key, round(factor, 9)))
+        changed = {"x.up": {"a.margins.disk": 1.0 + 3e-9}, "x.none": {"budgets.Beacon.margin_db": 2.0 + 1e-9}}
+        if (key, round(factor, 9)) == ("x.down", 3.0):
+            return None
+        down = {"budgets.Answer.margin_db": -1e-300, "budgets.Beacon.margin_db": -2.0} if key == "x.down" else {}
+        return given | changed.get(key, {}) | down
+
+    found = dependences._dependences([sweep], numbers_of, lambda *each: told.append(each))
+    assert found == {"Disk margin": ["x.up"], "Link margin | Answer": ["x.down"], "Link margin | Beacon": ["x.down"]}
+    assert asked == [("", 1.0), ("x.up", 2.0), ("x.down", 3.0), ("x.down", 0.25), ("x.none", round(2**0.2, 9))]
+    assert told == [(k, 3, "what depends on what") for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "factor", "of"),
+    [
+        (gains, "strehl_loss_db", 1.001, "budgets"),
+        (gains, "air_mass", 1.001, "clear-sky"),
+        (gains, "clear_sky_loss_db", 1.001, "clear-sky"),
+        (gains, "aperture_gain_db", 1.0001, "mathworks-link"),
+        (gains, "pointing_db_per_rad2", 1.0001, "tornado"),
+        (fading, "penalty_db", 1.02, "uncoded"),
+        (coded, "_falling", 1.01, "coded-fades"),
+        (variation, "_edge", 1.0001, "solved"),
+        (judge, "full_width_at_half_maximum_rad", 1.0001, "standard"),
+        (judge, "power_at_aperture_w", 1.0001, "standard"),
+        (sampling, "_open_unit", 0.9, "drawn-rows"),
+    ],
+)
+def test_a_check_sees_a_number_that_is_a_little_off(monkeypatch, tmp_path, module, name, factor, of):
+    right = getattr(module, name)
+    monkeypatch.setattr(module, name, lambda *args, **more: factor * right(*args, **more))
+    assert failing(of, tmp_path)
