@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from link_files import link_file
 from microrad import link
 from microrad.core.intervals import binomial_band, clustered_band
 from microrad.link.coupling import Aberrations, Pupil, SingleModeFibre
-from microrad.link.pointing import outage
+from microrad.link.pointing import code_words, outage
 from microrad.link.pointing.code_words import FadeMargin, words_asked
 from microrad.link.pointing.light import Light
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
@@ -154,3 +155,86 @@ def test_words_that_no_run_can_have_are_refused(word_s, runs, words):
     with pytest.raises(ValueError, match=words) as refused:
         lost(MARGIN, word_s, runs=runs)
     assert "\n" not in str(refused.value)
+
+
+# -------------------------------------------------------------------------------------------- counted slice by slice
+def in_slices(tally, error, *cuts):
+    for first, last in pairwise((0, *cuts, len(error))):
+        tally.add(first, error[first:last])
+    return tally.mean
+
+
+@pytest.mark.parametrize(("length", "cuts"), [(7, (10, 11, 40)), (1, (50,)), (23, (23, 46)), (100, (3,))])
+@pytest.mark.parametrize("loss_db", [0.7, 2.2, -0.5])
+def test_words_on_two_axes_are_counted_in_any_slices(length, cuts, loss_db):
+    error = np.random.default_rng(6).normal(8e-6, 21e-6, (107, 2, 5))
+    light = Light(63e-6, 4e-6)
+    found = in_slices(code_words._Lost(FadeMargin(light, loss_db), length), error, *cuts)
+    power = np.exp(-2.0 * ((np.hypot(error[:, 0], error[:, 1]) + 4e-6) / 63e-6) ** 2)
+    whole = 107 // length
+    words = power[: whole * length].reshape(whole, length, 5).mean(axis=1)
+    assert_allclose(found, [np.mean(each < 10.0 ** (-0.1 * loss_db), axis=0) for each in (words, power)], rtol=1e-12)
+
+
+@pytest.mark.parametrize("span", [Span(3.3, 0.3, 1), Span(2.0, 0.5, 4)])
+def test_the_answer_of_words_is_the_mean_of_the_runs_with_the_band_of_their_trials(span):
+    asked = words_asked(MARGIN, 0.0234, LOOP.parts, span)
+    shares = np.array([[0.11, 0.23], [0.05, 0.31], [0.17, 0.19], [0.29, 0.07]])
+    found = asked.answer([shares, -shares])
+    samples = round((span.duration_s - span.settle_s) * 1000.0)
+    words = samples // 23
+    assert (found.code_word_s, found.words, asked.twin) == (0.0234, 4 * words, False)
+    for interval, by_run, trials in ((found.lost, shares[:, 0], words), (found.time, shares[:, 1], samples)):
+        assert interval.value == pytest.approx(by_run.mean(), rel=1e-12)
+        assert (interval.low, interval.high) == clustered_band(by_run, trials, 0.99)
+    (tally,) = asked.tallies()
+    assert tally._words.length == 23
+    twin = replace(MARGIN, light=replace(MARGIN.light, end=SingleModeFibre(Pupil(0.04, 1.55e-6, truncation=1.1))))
+    assert words_asked(twin, 0.02, LOOP.parts, span).twin
+
+
+@pytest.mark.parametrize("receives", [{"pointing_error": "3 urad"}, {"twin": True}])
+def test_the_margin_of_a_link_with_a_fibre_is_that_of_its_beam_and_of_all_that_it_may_lose(tmp_path, receives):
+    table = {"into": "single-mode fibre", "mode_radius": "best", **receives}
+    changes = {"beacon": None, "answer": None, "acquisition": None, "communication.coupling": table}
+    if "twin" not in receives:
+        beam = {"profile": "gaussian", "radius": "23 mm", "m_squared": 1.2}  # it falls off unlike a Gaussian
+        changes |= {"communication.beam": beam, "conventions.pointing_loss": "pattern"}
+    changes["communication.transmit_power"] = "9 W"
+    data = link.of(link_file(tmp_path, changes, {"requirement.outage": 0.01}).mission)
+    margin, under, twin = FadeMargin.of(data), outage.Exposure.stated(data), "twin" in receives
+    assert (margin.light.end is None, margin.light.given_db > 0.0) == (not twin, not twin)
+    spare = under.on_axis_db - margin.light.given_db - data.requirement.margin_db
+    at_reach = float(transmission(under.fall.error_rad(spare), margin.light.half_angle_rad))
+    assert at_reach == pytest.approx(10.0 ** (-0.1 * margin.loss_db), rel=1e-9)
+    own = pytest.approx(under.fall.half_angle_rad, rel=1e-12)
+    assert margin.loss_db == pytest.approx(spare, rel=1e-12) if twin else margin.light.half_angle_rad == own
+    none = FadeMargin.of(data_short(data))
+    assert none.loss_db == pytest.approx(spare + data.requirement.margin_db - 80.0, abs=1e-9)
+    assert none.light == Light.of(data)
+
+
+def data_short(data):
+    """The link with more margin required than it has."""
+    return replace(data, requirement=data.requirement.with_value("margin_db", 80.0))
+
+
+@pytest.mark.parametrize(("word_s", "words"), [
+    (3.4, "a code word of 3.4 s is longer than a run, of which 3 s are left behind its settling: make the runs longer"),
+    (0.00149, "a code word of 1.49 ms has less than two control samples, 1 ms apart: it sees the power of a moment, "
+     "and the share of time is its own; leave code_word out"),
+])  # fmt: skip
+def test_a_refusal_of_a_code_word_is_one_whole_sentence(word_s, words):
+    with pytest.raises(ValueError) as refused:
+        words_asked(MARGIN, word_s, LOOP.parts, SPAN)
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_the_light_between_two_alike_is_split_between_their_axes(axes):
+    bent = SingleModeFibre(Pupil(0.11, 1.55e-6, 0.1, Aberrations(coma_m=80e-9), 1.0), 0.4e-6)
+    both = np.random.default_rng(8).normal(1e-6, 4e-6, (30, 2 * axes, 3))
+    found = Light(70e-6, 3e-6, bent, 1.7).power(both)
+    sent = np.exp(-2.0 * ((np.sqrt(np.sum(both[:, :axes] ** 2, axis=1)) + 3e-6) / 70e-6) ** 2)
+    across = both[:, 3] if axes == 2 else 0.0
+    assert_allclose(found, sent * bent.share(both[:, axes], across) / bent.share(0.0), rtol=1e-12)

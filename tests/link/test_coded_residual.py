@@ -1,14 +1,17 @@
 """Coded error ratio under simulated residuals: against whole runs in memory, and what is refused."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from link_files import link_file
 from microrad import link
+from microrad.core.intervals import student
 from microrad.link.coupling import Pupil, SingleModeFibre
 from microrad.link.fade_series import CodedLink, FadeSeries, code
+from microrad.link.pointing import coded_residual
 from microrad.link.pointing.coded_residual import CodedBeam, coded_asked
 from microrad.link.pointing.light import Light
 from microrad.link.pointing.outage import Exposure
@@ -102,3 +105,52 @@ def test_terminal_and_data_have_the_same():
     assert "with a block interleaver over 20 ms, at 3.00 dB more on the axis" in said
     assert f"power that pointing costs {found.penalty_db:.2f} dB" in said
     assert "coded" not in simulated_data([], None, RUNS)
+
+
+# -------------------------------------------------------------------------------------------- counted slice by slice
+EXTRA_DB = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0)
+
+
+@pytest.mark.parametrize(("length", "cuts"), [(6, (11, 12, 40)), (1, (50,)), (90, (3, 44))])
+def test_errors_on_two_axes_are_decoded_in_any_slices(length, cuts):
+    error = np.random.default_rng(9).normal(5e-6, 24e-6, (95, 2, 3))
+    beam = CodedBeam(Light(70e-6, 3e-6), 1.25, CODE, 2e-5, "block", length * 1e-3)
+    tally = coded_residual._Coded(beam, length)
+    for first, last in pairwise((0, *cuts, 95)):
+        tally.add(first, error[first:last])
+    power = np.exp(-2.0 * ((np.hypot(error[:, 0], error[:, 1]) + 3e-6) / 70e-6) ** 2)
+    whole, needed = 95 // length, CODE.snr_for(2e-5)
+    expected = []
+    for db in (1.25, *EXTRA_DB):
+        parts = CODE.parts(needed * 10.0 ** (0.1 * db) * power[: whole * length])
+        ratios = CODE.ratio([each.reshape(whole, length, 3).mean(axis=1) for each in parts])
+        expected.append(ratios.mean(axis=0))
+    assert tally.mean == pytest.approx(np.array(expected), rel=1e-9)
+
+
+def falls(slope, at=1e-4):
+    return [
+        at * 10.0 ** (-slope * db) for db in (*np.arange(0.0, 3.25, 0.5), 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 16.0, 20.0)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("slope", "cost_db"), [(0.1, 10.0), (0.25, 4.0), (0.4, 2.5), (0.05, 20.0), (0.049, math.inf), (3.0, 1.0 / 3.0)]
+)
+def test_the_answer_is_the_mean_with_its_half_width_and_where_the_others_meet_the_target(slope, cost_db):
+    beam = CodedBeam(Light(100e-6, 0.0), 2.75, CODE, 1e-5, "convolutional", 0.02)
+    asked = coded_asked(beam, LOOP.parts, SPAN)
+    own = np.array([2e-6, 5e-6, 3e-6])
+    by_run = np.outer([0.5, 1.0, 1.5], falls(slope))
+    found = asked.answer([np.column_stack([own, by_run]), np.zeros((3, 16))])
+    half = student(0.99, 2) * np.std(own, ddof=1) / math.sqrt(3.0)
+    assert (found.ratio.value, found.ratio.low) == (pytest.approx(own.mean()), 0.0)
+    assert found.ratio.high == pytest.approx(own.mean() + half, rel=1e-9)
+    assert found.penalty_db == pytest.approx(cost_db, rel=1e-6)
+    said = (found.code, found.target, found.interleaving, found.span_s, found.on_axis_db)
+    assert said == ("ccsds-k7-1-2", 1e-5, "convolutional", 0.02, 2.75)
+
+
+@pytest.mark.parametrize(("at", "cost_db"), [(1e-5, 0.0), (1.0000005e-5, 0.0), (0.9e-5, 0.0), (1.1e-5, 0.4139269)])
+def test_errors_that_meet_the_target_cost_nothing(at, cost_db):
+    assert coded_residual._cost_db(np.array(falls(0.1, at)), 1e-5) == pytest.approx(cost_db, rel=1e-5)

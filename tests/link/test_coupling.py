@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.special import j0, j1
 
 from microrad.link import beams, coupling
-from microrad.link.coupling import Aberrations, BothEnds, Disk, Losses, Pupil, SingleModeFibre
+from microrad.link.coupling import Aberrations, BothEnds, Disk, Losses, Pupil, SingleModeFibre, losses
 from microrad.link.pointing import MovingEnd, fades, fades_of_both
 from microrad.link.radial_error import Jitter, radial_steps
 
@@ -388,3 +388,79 @@ MORE = Losses.of(np.array([0.25, 2.0]), np.array([3.0, 1.0]))
 ])  # fmt: skip
 def test_ends_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+# ------------------------------------------------------------------------------------------------ wide, and very many
+@pytest.mark.parametrize(("obscuration", "radius"), [(0.3, 900.0), (0.55, 2000.0)])
+def test_of_a_disk_beyond_the_tables_what_lies_outside_is_that_of_the_edges(obscuration, radius):
+    """Beyond x lie 2 (1 + e) / (pi (1 - e^2) x) of the light of an annular aperture, x in pi D / lambda."""
+    pupil = Pupil(0.2, 1.31e-6, obscuration)
+    disk = Disk(pupil, 0.0, radius / pupil.per_rad)
+    outside = 2.0 / (math.pi * (1.0 - obscuration) * radius)
+    assert float(disk.share(0.0)) == pytest.approx(1.0 - outside, abs=1e-4)
+    at_edge, half = radius / pupil.per_rad, float(disk.share(radius / pupil.per_rad))
+    assert half == pytest.approx(0.5, abs=0.01)
+    assert float(disk.share(at_edge + 300.0 / pupil.per_rad)) < 0.01
+    assert disk.error_rad(3.0) == pytest.approx(at_edge, rel=0.01)
+
+
+def many(count, seed):
+    rng = np.random.default_rng(seed)
+    return rng.gamma(2.0, 0.7, count), rng.random(count) * (rng.random(count) > 0.3)
+
+
+@pytest.mark.parametrize("count", [4000, 4001, 9001])
+def test_losses_so_many_that_few_are_alike_keep_mean_and_tail(count):
+    loss, share = many(count, 3)
+    found, whole = Losses.of(loss, share), share / share.sum()
+    assert found.loss_db.size <= 4000 and np.all(np.diff(found.loss_db) >= 0.0)
+    assert found.share.sum() == pytest.approx(1.0, rel=1e-12)
+    assert found.share @ found.loss_db == pytest.approx(whole @ loss, rel=1e-12)
+    assert (found.loss_db.size == 4000) == (count <= 4000) or np.all(found.share > 0.0)
+    for at in (0.3, 1.4, 4.0):
+        assert float(found.beyond(at)) == pytest.approx(whole[loss > at].sum(), abs=1e-3)
+
+
+def test_losses_put_together_are_means_of_neighbours_by_their_shares():
+    loss, share = np.arange(1.0, 8.0), np.array([2.0, 1.0, 0.0, 0.0, 3.0, 1.0, 3.0]) / 10.0
+    found = losses._fewer(Losses(loss, share), 3)  # of two, two without any time, and three
+    assert found.loss_db.tolist() == pytest.approx([4.0 / 3.0, 6.0])
+    assert found.share.tolist() == pytest.approx([0.3, 0.7])
+    same = Losses(loss, share)
+    assert losses._fewer(same, 7) is same
+
+
+def test_the_sum_of_two_ends_with_very_many_losses_is_that_of_both():
+    sent, received = Losses.of(*many(5000, 1)), Losses.of(1.5 + 0.2 * many(700, 2)[0], many(700, 5)[1])
+    both = BothEnds(sent, received)
+    for pair in (both, BothEnds(received, sent)):
+        assert pair.sum.loss_db.size <= 4000
+        assert pair.sum.mean_db == pytest.approx(both.mean_db, abs=2e-3)
+        for at in (2.0, 3.1, 6.0):
+            drawn = float(sent.share @ received.beyond(at - sent.loss_db))
+            assert pair.beyond(at) == pytest.approx(drawn, abs=2e-3)
+            assert float(pair.sum.beyond(at)) == pytest.approx(drawn, abs=5e-3)
+        for exceeded in (0.02, 0.5):
+            assert pair.beyond(pair.quantile_db(exceeded)) == pytest.approx(exceeded, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("at", "expected"), [(-1.0, 1.0), (2.499, 1.0), (2.5, 0.0), (3.0, 0.0), ([1, 3], [1.0, 0.0]), (math.inf, 0.0)]
+)
+def test_one_loss_is_there_all_the_time(at, expected):
+    one = Losses.single(2.5)
+    assert np.asarray(one.beyond(at)).tolist() == expected
+    assert (one.mean_db, one.moved(-1.25).mean_db) == (2.5, 1.25)
+    pair = BothEnds(one, Losses.single(0.75))
+    assert (pair.mean_db, pair.quantile_db(0.3), pair.sum.loss_db.tolist()) == (3.25, 3.25, [3.25])
+    assert (pair.beyond(3.2), pair.beyond(3.3)) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("share", [np.array([0.0, 3.0, 1.0]), np.array([1.0, 0.0, 3.0])])
+def test_radial_errors_at_an_end_without_symmetry_come_from_all_directions(share):
+    radius, angle = np.array([0.0, 2e-6, 5e-6]), 2.0 * math.pi * np.arange(32) / 32
+    x, y = np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))
+    found = losses.of_radii(FIBRE, radius, share)
+    lost = FIBRE.loss_db(x, y) - FIBRE.loss_db(0.0)
+    power = (10.0 ** (-0.1 * lost)).mean(axis=1) @ share / share.sum()
+    assert found.mean_db == pytest.approx(-10.0 * math.log10(power), rel=1e-9)

@@ -1,5 +1,6 @@
 """Coded error rate over series of received power: against bit-true simulations of the same, and what is refused."""
 
+import hashlib
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 import viterbi
+from microrad.core.intervals import student
 from microrad.link.fade_series import (
     CodedLink,
     FadeSeries,
@@ -21,6 +23,7 @@ from microrad.link.fade_series import (
     read_fade_series,
     reader,
 )
+from microrad.link.fade_series import coded as coded_module
 from microrad.link.fade_series.coded import cost
 from microrad.link.fade_series.codes import mutual_information
 from microrad.link.fade_series.records import part
@@ -508,3 +511,205 @@ def test_powers_and_levels_are_taken_up_to_the_largest_and_darkness_too():
     assert series_of(np.r_[np.ones(299), 1e30]).power[-1] == pytest.approx(300.0)
     assert series_of(np.r_[np.full(299, -np.inf), 300.0], unit="dB", normalised="largest").power[-1] == 1.0
     assert series_of(np.r_[np.zeros(299), 2.0], normalised="largest").power[[0, -1]].tolist() == [0.0, 1.0]
+
+
+# ------------------------------------------------------------------------------------------ series unlike each other
+UNEVEN = replace(series_of(scintillation(1000, 25, 4, 0.7), normalised="largest"), period_s=2.5e-5, source="uneven")
+OWN_RATE = 7e6
+
+
+def uneven(kind="none", span_s=0.0, coded=CODE, rate=OWN_RATE, series=UNEVEN):
+    return CodedLink(coded, series, rate, kind, span_s)
+
+
+def numbers_of(found):
+    """All numbers of a coded link under fades, but for its curve."""
+    fades = found.fades
+    return [
+        found.margin_db, found.span_s, found.window_s, found.words, found.ratio.value, found.ratio.low,
+        found.ratio.high, found.lost.value, found.lost.low, found.lost.high, found.penalty_db, found.margin_left_db,
+        fades.level, fades.share, fades.per_second, fades.mean_s, fades.median_s, fades.ninetieth_s, fades.longest_s,
+        fades.unresolved,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("link", "margin_db", "target", "expected", "curve"), [
+    (uneven(), 7.5, 3e-5,
+     [7.5, 0.0, 2.5e-05, 1000.0, 0.0362478257, 0.0, 0.0957570393, 0.341, 0.104529815, 0.644623001, 13.5909778,
+     -6.09097777, 0.0437423612, 0.025, 40.0, 0.000625, 0.000625, 0.000625, 0.000625, 0.0],
+     [0.0, 5e-05, 7.5e-05, 0.0001, 0.000175, 0.00025, 0.000375, 0.00055, 0.000825, 0.00125, 0.001875, 0.0028,
+     0.004175, 0.00625, 13.5909778, 13.5883499, 13.5843323, 13.5779295, 13.5530313, 13.5244777, 13.4885411,
+     13.4522365, 12.8218863, 11.7061622, 11.807073, 10.8896959, 9.86190859, 8.04150712]),
+    (uneven("block", 8e-4), 6.25, 1e-7,
+     [6.25, 0.0008, 0.0008, 31.0, 0.0281438377, 0.0, 0.0673965913, 0.64516129, 0.378402862, 0.859206375, 12.3322124,
+     -6.08221242, 0.0584492252, 0.059, 120.0, 0.000491666667, 0.0003, 0.00078, 0.0009, 0.0],
+     [0.0, 5e-05, 7.5e-05, 0.0001, 0.000175, 0.00025, 0.000375, 0.00055, 0.000825, 0.00125, 0.001875, 0.0028,
+     0.004175, 0.00625, 13.9465049, 13.9438842, 13.9398207, 13.9334497, 13.9041861, 13.8986159, 13.8444255,
+     13.7764891, 13.1921877, 12.3013689, 12.1434545, 11.4244356, 10.5666297, 9.06074144]),
+    (uneven("convolutional", 1.3e-3), 6.25, 1e-7,
+     [6.25, 0.0013, 0.0013, 949.0, 0.0224430433, 0.0, 0.0709505769, 0.617492097, 0.283367822, 0.882942139, 12.402851,
+     -6.15285103, 0.05750623, 0.054, 120.0, 0.00045, 0.000275, 0.000735, 0.00085, 0.0],
+     [0.0, 5e-05, 7.5e-05, 0.0001, 0.000175, 0.00025, 0.000375, 0.00055, 0.000825, 0.00125, 0.001875, 0.0028,
+     0.004175, 0.00625, 13.9465049, 13.9441645, 13.9401025, 13.9342991, 13.9066802, 13.8641153, 13.7620863,
+     13.5626215, 13.1568987, 12.4758459, 11.9097681, 11.3823952, 10.3275605, 9.10382617]),
+    (uneven(coded=Threshold("long", 0.5, 1400, 0.6)), 6.75, 0.02,
+     [6.75, 0.0, 0.0002, 125.0, 0.472, 0.197311174, 0.746688826, 0.472, 0.212721439, 0.754289605, 13.890703,
+     -7.14070303, 0.0408253294, 0.022, 40.0, 0.00055, 0.00055, 0.00055, 0.00055, 0.0],
+     [0.0, 5e-05, 7.5e-05, 0.0001, 0.000175, 0.00025, 0.000375, 0.00055, 0.000825, 0.00125, 0.001875, 0.0028,
+     0.004175, 0.00625, 13.890703, 13.890703, 13.890703, 13.890703, 13.890703, 14.057398, 13.5577233, 14.7438344,
+     13.9244916, 12.4607867, 12.5933495, 11.2755779, 9.88679241, 7.61971021]),
+    (uneven("convolutional", 6e-4, Threshold("short", 0.5, 90, 0.4)), 5.5, 0.011,
+     [5.5, 0.0006, 0.0006, 977.0, 0.681678608, 0.395892974, 0.967464242, 0.681678608, 0.352292109, 0.914726718,
+     14.3871376, -8.88713764, 0.0364154965, 0.017, 40.0, 0.000425, 0.000425, 0.000425, 0.000425, 0.0],
+     [0.0, 5e-05, 7.5e-05, 0.0001, 0.000175, 0.00025, 0.000375, 0.00055, 0.000825, 0.00125, 0.001875, 0.0028,
+     0.004175, 0.00625, 14.8704465, 14.8521037, 14.8871005, 14.8427858, 14.8463594, 14.7781415, 14.6697235,
+     14.4741563, 13.9757252, 13.1500576, 12.5305707, 11.8459845, 9.76301112, 8.203162]),
+])  # fmt: skip
+def test_a_coded_link_under_fades_of_numbers_unlike_each_other(link, margin_db, target, expected, curve):
+    found = coded_fading(link, margin_db, target)
+    assert numbers_of(found) == pytest.approx(expected, rel=1e-6, abs=1e-12)
+    assert [*found.curve.span_s, *found.curve.penalty_db] == pytest.approx(curve, rel=1e-6, abs=1e-9)
+    assert (found.code, found.source, found.target) == (link.code.name, "uneven", target)
+    assert found.interleaving == link.interleaving
+
+
+@pytest.mark.parametrize(("series", "level", "expected"), [
+    ("7 7 7 1 1 7 1 7 1 1 1 1 7 1 1", 2.0, [9 / 15, 4 / 15, 7 / 3, 2.0, 3.6, 4.0, 1 / 9]),
+    ("1 1 1 7 2 7 7 3 3 7 7 7 7 7 7", 3.0, [4 / 15, 1 / 15, 1.0, 1.0, 1.0, 1.0, 0.25]),
+    ("1 1 7 7 7 7 7 7 7 7 7 7 7 7 1", 2.0, [3 / 15, 1 / 15, *[math.nan] * 4, 1 / 3]),
+    ("1 1 1 1 1 1 1 1 1 1 1 1 1 1 1", 2.0, [1.0, 0.0, *[math.nan] * 4, 0.0]),
+    ("7 7 7 7 7 7 7 7 7 7 7 7 7 7 7", 2.0, [0.0, 0.0, *[math.nan] * 4, 0.0]),
+])  # fmt: skip
+def test_the_fades_of_a_few_samples_are_counted_by_hand(series, level, expected):
+    power = np.array(series.split(), dtype=np.float64)
+    found = FadeSeries(power, 1.0, "few", "as-given").fades(level)
+    names = ("share", "per_second", "mean_s", "median_s", "ninetieth_s", "longest_s", "unresolved")
+    assert [getattr(found, name) for name in names] == pytest.approx(expected, rel=1e-12, nan_ok=True)
+    assert found.level == level
+    halved = FadeSeries(power, 0.5, "few", "as-given").fades(level)
+    assert [halved.share, halved.unresolved] == [found.share, found.unresolved]
+    assert [halved.per_second / 4.0, halved.mean_s] == pytest.approx(
+        [found.per_second / 2.0, found.mean_s / 2.0], nan_ok=True
+    )
+
+
+@pytest.mark.parametrize(("values", "length", "blocks", "sliding"), [
+    ([1.0, 2.0, 4.0, 8.0, 16.0], 2, [1.5, 6.0], [1.5, 3.0, 6.0, 12.0]),
+    ([1.0, 2.0, 4.0, 8.0, 16.0], 3, [7 / 3], [7 / 3, 14 / 3, 28 / 3]),
+    ([5.0, 7.0], 2, [6.0], [6.0]),
+])  # fmt: skip
+def test_windows_stand_behind_each_other_or_slide(values, length, blocks, sliding):
+    assert coded_module._blocks(np.array(values), length) == pytest.approx(blocks, rel=1e-12)
+    assert coded_module._sliding(np.array(values), length) == pytest.approx(sliding, rel=1e-12)
+
+
+@pytest.mark.parametrize(("function", "value", "expected"), [
+    (lambda db: 10.0 ** (-0.1 * db), 0.5, 10.0 * math.log10(2.0)),
+    (lambda db: 10.0 ** (-0.1 * db), 10.0**-4.2, 42.0),
+    (lambda db: 10.0 ** (-0.1 * db), 10.0**5.7, -57.0),
+    (lambda db: 10.0 ** (-0.1 * db), 10.0**6.1, -60.0),
+    (lambda db: 10.0 ** (-0.1 * db), 10.0**-6.1, math.inf),
+    (lambda db: 10.0 ** (-0.1 * db), 10.0**-5.9, 59.0),
+    (lambda db: 0.25, 0.25, -60.0),
+    (lambda db: 0.25, 0.2, math.inf),
+])  # fmt: skip
+def test_extra_power_is_looked_for_up_to_60_db_either_way(function, value, expected):
+    assert coded_module._falling(function, value) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(("count", "each", "left"), [(5, 1, 5), (16, 1, 16), (47, 2, 23), (48, 3, 16), (100, 6, 16)])
+def test_an_interval_is_told_from_sixteen_parts_or_more(count, each, left):
+    values = np.arange(float(count)) ** 2
+    parts = [values[k * each : (k + 1) * each].mean() for k in range(left)]
+    assert coded_module._parts(values) == pytest.approx(parts, rel=1e-12)
+    found = coded_module._interval(values)
+    half = student(0.99, left - 1) * np.std(parts, ddof=1) / math.sqrt(left)
+    mean = values.mean()
+    assert (found.value, found.low, found.high) == pytest.approx((mean, max(mean - half, 0.0), mean + half), rel=1e-9)
+    alone = coded_module._interval(values[3:4])
+    assert (alone.value, alone.low, alone.high) == (9.0, 0.0, math.inf)
+
+
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: uneven("blok", 1e-3), "the interleaving is 'blok'; give one of none, block, convolutional."),
+    (lambda: uneven("none", 1e-3), "interleaving is 'none' and its span 1 ms; give a span above 0 s, or interleaving "
+     '"none" without one.'),
+    (lambda: uneven("convolutional"), "interleaving is 'convolutional' and its span 0 s; give a span above 0 s, or "
+     'interleaving "none" without one.'),
+    (lambda: uneven(rate=500.0), "uneven: the series lasts 25 ms and a code word, 35 bits, lasts 70 ms; give a series "
+     "of many times that, or shorten the latter."),
+    (lambda: uneven("block", 0.0312), "uneven: the series lasts 25 ms and the interleaver spans 31.2 ms; give a "
+     "series of many times that, or shorten the latter."),
+    (lambda: series_of(np.ones(300), unit="dBm"), "series: the unit is 'dBm'; give one of linear, dB."),
+    (lambda: series_of(np.ones(300), normalised="1"), "series: the normalisation is '1'; give one of mean, largest, "
+     "as-given."),
+    (lambda: FadeSeries.of(np.ones(300), -2e-3, "s", unit="dB", normalised="mean"), "s: the sampling period is -2 ms: "
+     "it must be finite, above 0 s."),
+    (lambda: series_of(np.ones((2, 150))), "series: the powers have the shape (2, 150); give one series, of shape "
+     "(samples,)."),
+    (lambda: series_of(np.ones(199)), "series: the series has 199 samples; from 200 to 2000000 are taken: give a "
+     "longer one."),
+    (lambda: series_of(np.r_[np.ones(250), -3.5, np.inf, -1.0]), "series: sample 250 is -3.5, and 3 such samples are "
+     'in it: a power must be finite, 0 or above and at most 1e+30 (unit "dB" if these are levels); cut out a part '
+     "without them."),
+    (lambda: series_of(np.r_[np.ones(250), np.inf, -1.0]), "series: sample 250 is inf, and 2 such samples are in it: "
+     "a power must be finite, 0 or above and at most 1e+30; cut out a part without them."),
+    (lambda: series_of(np.r_[np.zeros(250), np.nan, -np.inf, 301.0, -5.0], unit="dB"), "series: sample 250 is nan, "
+     "and 2 such samples are in it: a power must be at most 300 dB; cut out a part without them."),
+    (lambda: series_of(np.zeros(200)), "series: no sample is above 0: there is no light in the series; name another "
+     "one."),
+    (lambda: series_of(np.tile([1.0, 1.0, 0.1], 100), normalised="largest").resolves(0.5), "series: the series is "
+     "sampled slower than its fades: 100 % of the time below -3.0 dB is in fades of a single sample, 10 µs, and at "
+     "most 10 % may be; give a series that is sampled faster."),
+])  # fmt: skip
+def test_a_refusal_of_a_series_is_one_whole_sentence(call, words):
+    with pytest.raises(FadeSeriesError) as refused:
+        call()
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(("text", "given", "words"), [
+    ("power (dBW)\n" + "1\n" * 300, {}, "NAME: the file says that the powers are in dBW, and the unit given is "
+     "'linear'; give the one that the file says, or correct it."),
+    ("power (mW)\n" + "1\n" * 300, {"unit": "dB"}, "NAME: the file says that the powers are in mW, and the unit given "
+     "is 'dB'; give the one that the file says, or correct it."),
+    ("power\n" + "1\n" * 300, {"period_s": None}, "NAME: the file does not say how fast it was sampled; give the time "
+     "between two samples (sampling, period_s), or a column of times."),
+    ("power\n" + "1\n" * 250 + "-2\n", {"name": "Ours"}, "Ours: sample 250 is -2, and 1 such samples are in it: a "
+     'power must be finite, 0 or above and at most 1e+30 (unit "dB" if these are levels); cut out a part without '
+     "them."),
+])  # fmt: skip
+def test_a_refusal_of_a_file_of_powers_is_one_whole_sentence(tmp_path, text, given, words):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(FadeSeriesError) as refused:
+        read_fade_series(path, **{"unit": "linear", "normalised": "mean", "period_s": 1e-3, **given})
+    assert str(refused.value).replace(str(path), "NAME") == words
+
+
+@pytest.mark.parametrize(("channel", "first"), [("b", 4.0), (2, 4.0), ("a", 0.5), (1, 0.5)])
+def test_a_channel_of_a_file_is_read_by_name_or_number_with_its_hash(tmp_path, channel, first):
+    path = tmp_path / "a.csv"
+    path.write_text("time (s),a,b\n" + "".join(f"{k * 2e-4:.4f},{0.5 + k % 7},{4 + k % 3}\n" for k in range(250)))
+    found = read_fade_series(str(path), unit="linear", normalised="as-given", channel=channel, name="Ours")
+    assert (found.power[0], found.power.size, found.source, found.normalised) == (first, 250, "Ours", "as-given")
+    assert found.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert found.period_s == pytest.approx(2e-4, rel=1e-9)
+    assert part(found, 7, 19).power.tolist() == found.power[7:19].tolist()
+    assert (part(found, 7, 19).duration_s, part(found, 7, 19).source) == (pytest.approx(12 * 2e-4), "Ours")
+
+
+@pytest.mark.parametrize(("snr_db", "expected"), [
+    (-60.0, [0.5, 0.5, 1.65303824e-06, 6.0]),
+    (-3.0, [0.15349, 0.15349, 0.486365675, 6.0]),
+    (-0.4, [0.00106467506, 0.00106467506, 0.69065244, 6.0]),
+    (1.25, [6.12500912e-06, 6.12500912e-06, 0.812602058, 6.0]),
+    (4.5, [9.37954889e-13, 9.37954889e-13, 0.964812577, 6.0]),
+    (15.0, [1.00889452e-69, 1.00889452e-69, 1.0, 6.0]),
+])  # fmt: skip
+def test_the_code_of_ccsds_has_its_numbers_at_each_power(snr_db, expected):
+    snr = np.array([10.0 ** (0.1 * snr_db)])
+    found = [*CODE.at(snr), *CODE.ratio(CODE.parts(snr)), *mutual_information(snr), len(CODE.parts(snr))]
+    assert found == pytest.approx(expected, rel=1e-6, abs=0.0)
+    mixed = CODE.ratio([0.5 * (a + b) for a, b in zip(CODE.parts(snr), CODE.parts(2.0 * snr), strict=True)])
+    assert CODE.at(2.0 * snr)[0] <= mixed[0] <= CODE.at(snr)[0]

@@ -1,6 +1,7 @@
 """The open-loop pointing budget of a mission: what the beacon covers, point-ahead, and missions without a beacon."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 import budgets
 from microrad.core.budget import Line, root_sum_square, total_db
-from microrad.link.pointing.error_classes import error_term
+from microrad.link.pointing.error_classes import ErrorTerm, StatedError, error_term
 from microrad.link.pointing.summation import radial_total_rad
 from microrad.mission.file import load_mission
 from microrad.mission.model import LinkMission
@@ -275,3 +276,97 @@ def test_what_is_left_for_a_line_over_all_satellites_is_by_their_budget():
     for each in of.allocation(total):
         lines = [line.with_error(each.largest_rad) if line.name == each.name else line for line in of.stated]
         assert radial_total_rad([error_term(line, "mixed") for line in lines], of.confidence) == pytest.approx(total)
+
+
+# ------------------------------------------------------------------------------------------- lines unlike each other
+EACH_CLASS = {
+    "body_jitter": ("31 urad", "random", "2-sigma", "radial"),
+    "orbit-knowledge": ("17 urad", "drift", "bound", "per-axis"),
+    "mis alignment": ("53 urad", "bias", "1-sigma", "per-axis"),
+    "thermal": ("11 urad", "transient", "3-sigma", "radial"),
+    "noise": ("23 urad", "random", "bound", "radial"),
+}
+
+
+GAUSSIAN = {"temporal": [True, False, True, True, False, True], "mixed": [True, False, True, True, False, False]}
+
+
+@pytest.mark.parametrize(("interpretation", "expected", "words"), [
+    ("temporal",
+     [0.0, 0.0, 1.09601551e-05, 1.09601551e-05, 8.5e-06, 8.5e-06, 4.90747729e-06, 4.90747729e-06, 0.000159, 0.000159,
+     0.0, 0.0, 7.77817459e-06, 7.77817459e-06, 0.0, 0.0, 0.0, 0.0, 1.15e-05, 1.15e-05, 4.94974747e-06,
+     4.94974747e-06, 0.0, 0.0, 6.89782574e-05, 0.000120060784, 0.000212816314, 0.000300967718, 4.06987752e-05,
+     0.00028274482, 0.20197562, 0.0607398066, 0.590374107, 0.0254308533, 0.111181169, 0.0102984447, 6.89782574e-05,
+     0.000180227922, 0.000180227922, 1.66270362e-05, 1.66270362e-05, 0.000125, 0.000137956515, 1.96569839e-15,
+     0.00056548964, 0.00025, 6.89782574e-05, 0.372022344, 0.00028274482, 6.20429217e-05, 0.000137956515,
+     0.00056548964],
+     ["random, 2-sigma, radial: mean 0, standard deviation error / (2 sqrt(2)) over time",
+      "drift, bound, about each axis: ramp from zero to error, mean 1/2 and standard deviation 1/sqrt(12) of it; "
+      "worst-case satellite (temporal)",
+      "bias, 1-sigma, about each axis: mean 3 error, constant; worst-case satellite (temporal)",
+      "transient, 3-sigma, radial: mean error / sqrt(2) about each axis, counted as always present; worst-case "
+      "satellite (temporal)",
+      "random, bound, radial: mean 0, standard deviation error / 2, evenly over a disc over time",
+      "what correcting 62 µrad leaves; bias, bound, radial: mean error / sqrt(2) about each axis, constant; "
+      "worst-case satellite (temporal)"]),
+    ("mixed",
+     [0.0, 0.0, 1.09601551e-05, 1.09601551e-05, 0.0, 0.0, 5.66666667e-06, 5.66666667e-06, 0.0, 0.0, 5.3e-05, 5.3e-05,
+     0.0, 0.0, 2.59272486e-06, 2.59272486e-06, 0.0, 0.0, 1.15e-05, 1.15e-05, 0.0, 0.0, 3.5e-06, 3.5e-06,
+     6.89782574e-05, 0.000120060784, 0.000109345235, 0.000154637515, 0.000136558353, 0.000136558353, 0.20197562,
+     0.0607398066, 0.590374107, 0.0254308533, 0.111181169, 0.0102984447, 6.89782574e-05, 0.0, 0.0, 5.57894106e-05,
+     5.57894106e-05, 0.000125, 0.000137956515, 0.918737755, 0.000273116706, 0.00025, 6.89782574e-05, 0.999956393,
+     0.000136558353, 6.20429217e-05, 0.000137956515, 0.000273116706],
+     ["random, 2-sigma, radial: mean 0, standard deviation error / (2 sqrt(2)); random satellite at a random time "
+      "(mixed)",
+      "drift, bound, about each axis: mean 0, standard deviation error / sqrt(3), evenly up to the bound / sqrt(3), "
+      "ramp from zero; random satellite at a random time (mixed)",
+      "bias, 1-sigma, about each axis: mean 0, standard deviation error / 1; random satellite at a random time (mixed)",
+      "transient, 3-sigma, radial: mean 0, standard deviation error / (3 sqrt(2)), counted as always present; random "
+      "satellite at a random time (mixed)",
+      "random, bound, radial: mean 0, standard deviation error / 2, evenly over a disc; random satellite at a random "
+      "time (mixed)",
+      "what correcting 62 µrad leaves; bias, bound, radial: mean 0, standard deviation error / 2, evenly over a "
+      "disc; random satellite at a random time (mixed)"]),
+])  # fmt: skip
+def test_errors_of_each_class_are_told_and_summed_as_they_mean(interpretation, expected, words):
+    mission = with_lines(0.95, **EACH_CLASS)
+    tables = {"point_ahead": with_point_ahead("9.3 km/s", True, "7 urad").point_ahead}
+    tables["beacon"] = MISSION.beacon.model_copy(update={"divergence_rad": 250e-6})
+    found = budgets.open_loop(mission.model_copy(update=tables), SOURCES, interpretation=interpretation)
+    assert [line.name for line in found.lines] == [
+        "Body jitter", "Orbit knowledge", "Mis alignment", "Thermal", "Noise", "Point-ahead"
+    ]  # fmt: skip
+    numbers = [x for t in found.terms for x in (*t.mean_rad, *t.sigma_rad)]
+    numbers += [each.total_rad for each in found.summations]
+    numbers += [*found.variance_shares, found.rss_rad, *found.error.bias_rad, *found.error.rms_rad]
+    for each in (found.reading, found.counter_reading):
+        numbers += [each.half_angle_rad, each.required_divergence_rad, each.coverage, each.confident_divergence_rad]
+    numbers += [found.point_ahead.angle_rad, found.required_divergence_rad, found.confident_divergence_rad]
+    assert numbers == pytest.approx(expected, rel=1e-6, abs=1e-15)
+    assert [line.basis for line in found.lines] == words
+    own = "; our own formula, ECSS-E-ST-60-10C has no such class"
+    regimes = [f"uncorrelated with the other lines{more}" for more in ("", own, "", own, "", "")]
+    assert [line.regime for line in found.lines] == regimes
+    assert [t.gaussian for t in found.terms] == GAUSSIAN[interpretation]
+
+
+NONE_OF = 'no interpretation "spatial"; give one of temporal, mixed'
+
+
+@pytest.mark.parametrize(("call", "words"), [
+    (lambda: StatedError("Body", -2e-6, "bias", "bound", "x"), "Body: the error is -2 µrad"),
+    (lambda: StatedError("Body", math.inf, "bias", "bound", "x"), "Body: the error is inf"),
+    (lambda: StatedError("Body", 2e-6, "noise", "bound", "x"), 'Body: no kind "noise"; give one of '),
+    (lambda: StatedError("Body", 2e-6, "bias", "4-sigma", "x"), 'Body: no statistic "4-sigma"; give one of '),
+    (lambda: StatedError("Body", 2e-6, "bias", "bound", "y"), 'Body: no axes "y"; give one of per-axis, radial, x'),
+    (lambda: ErrorTerm("Body", "bias", 1e-6, (0.0, math.nan), (0.0, 0.0)), "Body: the mean"),
+    (lambda: ErrorTerm("Body", "bias", 1e-6, (0.0, 0.0), (0.0, -1e-6)), "Body: the standard deviation"),
+    (lambda: error_term(StatedError("Body", 2e-6, "bias", "bound", "x"), "spatial"), NONE_OF),
+    (lambda: budgets.open_loop(without_beacon(), SOURCES).covers, "the mission has no beacon, so nothing is covered; "
+     "give it a table [beacon]"),
+    (lambda: budgets.open_loop(MISSION.model_copy(update={"pointing": None}), SOURCES), "the mission states no "
+     "pointing errors; give it the table [pointing]"),
+])  # fmt: skip
+def test_a_refusal_of_an_error_says_which_and_what_to_give(call, words):
+    with pytest.raises(ValueError, match="^" + re.escape(words)):
+        call()

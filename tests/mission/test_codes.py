@@ -278,3 +278,58 @@ def test_a_threshold_holds_between_two_ratios(ratio, least, holds):
 )
 def test_of_a_name_like_some_codes_those_that_are_known_are_told(name, near):
     assert nearest(name) == near
+
+
+# ------------------------------------------------------------------------------------------------- each code by itself
+EACH_CODE = """
+ccsds-k7-1-2 0.5 0 1e-05 5.4274138
+dvb-s2-1-4 0.2451215 1e-07 1e-07 0.74588599 10.562774
+dvb-s2-1-3 0.328224 1e-07 1e-07 0.5879967 10.720664
+dvb-s2-2-5 0.394706 1e-07 1e-07 0.72696276 10.581698
+dvb-s2-1-2 0.494429 1e-07 1e-07 1.0486607 10.26
+dvb-s2-3-5 0.594152 1e-07 1e-07 1.4807244 9.827936
+dvb-s2-2-3 0.6611265 1e-07 1e-07 1.8868544 9.421806
+dvb-s2-3-4 0.7437365 1e-07 1e-07 2.3055091 9.0031513
+dvb-s2-4-5 0.793598 1e-07 1e-07 2.6736944 8.634966
+dvb-s2-5-6 0.8273315 1e-07 1e-07 2.9929044 8.3157559
+dvb-s2-8-9 0.8832255 1e-07 1e-07 3.7289841 7.5796763
+dvb-s2-9-10 0.894306 1e-07 1e-07 3.8948386 7.4138218
+scppm-1-2 0.5 1e-05 1e-05 1
+scppm-1-3 0.33333333 0 nan
+scppm-2-3 0.66666667 0 nan
+sda-11-13 0.84615385 0 nan
+sda-22-29 0.75862069 0 nan
+sda-2-3 0.66666667 0 nan
+sda-1-2 0.5 0 nan
+"""
+
+
+@pytest.mark.parametrize("line", EACH_CODE.strip().split("\n"), ids=lambda line: line.split()[0])
+def test_each_code_has_its_own_numbers(line):
+    name, *numbers = line.split()
+    code = codes()[name]
+    gains = [] if code.gap_db is not None or not code.known else [code.net_gain_db(code.ratios[1])]
+    found = [code.rate, *code.ratios, *(x for x in (code.threshold_db, code.gap_db) if x is not None), *gains]
+    assert found == pytest.approx([float(x) for x in numbers], rel=1e-5, nan_ok=True)
+    assert code.known == (len(found) > 3)
+    if code.known:
+        assert code.holds_at(code.ratios[1]) and not code.holds_at(1.001 * code.ratios[1])
+        assert code.holds_at(code.ratios[0]) and not (code.ratios[0] and code.holds_at(0.999 * code.ratios[0]))
+
+
+@pytest.mark.parametrize(("name", "ends"), [
+    ("ccsds-k7-1-2", ": union bound over its paths, Gaussian noise, no quantisation"),
+    ("dvb-s2-2-3", ": Gaussian noise, no loss in synchronisation"),
+    ("scppm-1-2", " dB from capacity, in one link, is taken for any order and background"),
+])  # fmt: skip
+def test_a_code_says_what_its_threshold_holds_for(name, ends):
+    code = codes()[name]
+    assert code.regime.startswith(f"{code.title}: ") and code.regime.endswith(ends)
+
+
+@pytest.mark.parametrize(("name", "near"), [
+    ("DVB-S2-1-2", 'code = "dvb-s2-1-2"'), ("ccsds-k7", 'code = "ccsds-k7-1-2"'), ("scppm", 'code = "scppm-'),
+    ("turbo", 'code = "ccsds-k7-1-2" or code = "dvb-s2-1-4" or code = "dvb-s2-1-3" or '),
+])  # fmt: skip
+def test_codes_of_names_nearest_to_another_are_offered(name, near):
+    assert nearest(name).startswith(near)

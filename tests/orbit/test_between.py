@@ -43,3 +43,41 @@ def test_a_search_that_cannot_be_is_refused(leo):
         find_contacts(leo, leo, START, 0.0)
     with pytest.raises(OrbitError, match="2027"):
         find_contacts(leo, leo, "2027-03-20T12:00:00Z", 100.0)
+
+
+def two(tmp_path):
+    """Two element sets of epochs, planes and names unlike each other."""
+    path = tmp_path / "two.tle"
+    other = element_set(day=80.25, revolutions=13.4, eccentricity=12345, name="OTHER", number="70002", inclination=51.6)
+    path.write_text(element_set() + other, encoding="utf-8")
+    return read_elements(path)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_element_sets_are_each_flown_from_the_start(tmp_path, turned):
+    first, second = two(tmp_path)[::-1] if turned else two(tmp_path)
+    start = "2026-03-21T02:30:00.5Z"
+    epoch = Epoch(start)
+    orbits = Sgp4Orbit(first, epoch), Sgp4Orbit(second, epoch)
+    found = find_contacts(first, second, start, 60_000.0)
+    sides = [Terminal(each, UNLIMITED, each.name) for each in orbits]
+    assert found == contacts(*sides, Earth("oblate", 100e3), epoch, (0.0, 60_000.0))
+    assert (
+        found == find_contacts(orbits[0], second, start, 60_000.0) == find_contacts(first, orbits[1], start, 60_000.0)
+    )
+    assert len(found) > 2 and found != find_contacts(first, second, "2026-03-21T03:00:00Z", 60_000.0)
+
+
+@pytest.mark.parametrize(("duration_s", "words"), [
+    (-5.0, "a search of -5.0 s finds nothing: give a duration above 0 s"),
+    (math.nan, "a search of nan s finds nothing: give a duration above 0 s"),
+    (15 * 86400.0, r"two\.tle, line 5 \(OTHER\): the elements are expired: their epoch is 2026-03-21T06:00:00Z"),
+])  # fmt: skip
+def test_a_search_says_which_of_two_satellites_ends_it(tmp_path, duration_s, words):
+    first, second = two(tmp_path)
+    slot = GeostationarySlot("relay", Epoch(START), 0.2)
+    with pytest.raises(OrbitError, match=words):
+        find_contacts(slot, second, START, duration_s)
+    if duration_s > 0.0:
+        with pytest.raises(OrbitError, match=r"two\.tle, line 2 \(EXAMPLE 1\): the elements are expired"):
+            find_contacts(first, second, START, duration_s)

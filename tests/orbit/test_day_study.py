@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from day_files import ALONE, HELD, KEPLERIAN, LIMITS, day_file, ephemeris
+from day_files import ALONE, EPOCH, HELD, KEPLERIAN, LIMITS, day_file, element_set, ephemeris
 from link_files import received_with
 from microrad import link, orbit
 from microrad.link import study as link_study
@@ -1304,3 +1304,173 @@ def test_each_contact_of_a_day_says_its_ends_and_its_station(unlike_day):
         ("perth", "kiruna", "kiruna", "kiruna"),
         ("tromso", "kiruna", "tromso", "tromso", "tenerife"),
     ]
+
+
+# ---------------------------------------------------------------------------------------- orbits as a mission has them
+UNLIKE_ORBITS = {
+    "orbit.epoch": "2026-03-21T06:30:00.5Z", "orbit.duration": "5 h", "orbit.earth": "sphere",
+    "orbit.grazing_height": "37 km", "orbit.geo.longitude": "-37.5 deg",
+    "orbit.leo": {
+        "kind": "keplerian", "semi_major_axis": "7654.3 km", "eccentricity": 0.0123, "inclination": "65.4 deg",
+        "node": "210 deg", "argument_of_perigee": "33 deg", "mean_anomaly": "127 deg", "gravity": "two-body",
+        "limits": {
+            "attitude": "sun", "boresight": [0.0, 0.6, -0.8], "field_of_regard": "71 deg", "slew_limit": "0.7 deg/s",
+            "sun_exclusion": "13 deg", "in_eclipse": False,
+        },
+    },
+    "orbit.geo.limits": {
+        "attitude": "nadir", "boresight": [0.8, 0.0, 0.6], "field_of_regard": "9.5 deg", "slew_limit": "0.3 deg/s",
+        "sun_exclusion": "4 deg", "in_eclipse": True,
+    },
+}  # fmt: skip
+DEG = math.pi / 180.0
+
+
+def pair_of(folder, *changes):
+    m = day_file(folder, ALONE, *changes).mission
+    return orbit.pair(m.orbit, m.terminals, folder)
+
+
+def test_both_terminals_of_a_mission_are_as_their_own_tables_say(tmp_path):
+    pair = pair_of(tmp_path, UNLIKE_ORBITS, {"terminals.leo_name": "Own", "terminals.geo_name": "Relay"})
+    assert (pair.epoch.text, pair.span_s, pair.tail_s, pair.whole_s) == (
+        "2026-03-21T06:30:00.5Z", (0.0, 18000.0), 86400.0, (0.0, 104400.0)
+    )  # fmt: skip
+    assert (pair.earth, pair.leo.name, pair.geo.name) == (orbit.Earth("sphere", 37e3), "Own", "Relay")
+    own, limits = pair.leo.orbit, pair.leo.limits
+    assert (own.name, own.epoch, own.j2, own.semi_major_axis_m, own.eccentricity) == (
+        "Own", pair.epoch, False, 7654.3e3, 0.0123
+    )  # fmt: skip
+    angles = (own.inclination_rad, own.node_rad, own.argument_of_perigee_rad, own.mean_anomaly_rad)
+    assert [each / DEG for each in angles] == pytest.approx([65.4, 210.0, 33.0, 127.0], rel=1e-12)
+    for found, kind, boresight, in_eclipse, numbers in (
+        (limits, "sun", (0.0, 0.6, -0.8), False, [71.0, 0.7, 13.0]),
+        (pair.geo.limits, "nadir", (0.8, 0.0, 0.6), True, [9.5, 0.3, 4.0]),
+    ):
+        assert (found.attitude, tuple(found.boresight), found.in_eclipse) == (kind, boresight, in_eclipse)
+        angles = (found.field_of_regard_rad, found.slew_limit_rad_s, found.sun_exclusion_rad)
+        assert [each / DEG for each in angles] == pytest.approx(numbers, rel=1e-12)
+    assert (pair.geo.orbit.name, pair.geo.orbit.longitude_rad / DEG) == ("Relay", pytest.approx(-37.5))
+
+
+@pytest.mark.parametrize(("changes", "expected"), [
+    ({"altitude": "700 km", "inclination": "51.6 deg", "node": "300 deg", "phase": "40 deg"},
+     [7078.137, 0.0, 51.6, 300.0, 0.0, 40.0]),
+    ({"altitude": "700 km", "inclination": "sun-synchronous", "node": "10 deg", "phase": "0 deg"},
+     [7078.137, 0.0, 98.18798, 10.0, 0.0, 0.0]),
+    ({"altitude": "500 km", "inclination": "97 deg", "local_time": "22.25 h", "phase": "7 deg"},
+     [6878.137, 0.0, 97.0, 151.78439, 0.0, 7.0]),
+])  # fmt: skip
+def test_a_circular_orbit_has_its_phase_and_its_local_time(tmp_path, changes, expected):
+    own = pair_of(tmp_path, {"orbit.leo": {"kind": "circular", "gravity": "j2", **changes}}).leo
+    found, e = own.orbit, own.orbit.eccentricity
+    angles = (found.inclination_rad, found.node_rad, found.argument_of_perigee_rad, found.mean_anomaly_rad)
+    assert [found.semi_major_axis_m / 1e3, e, *(each / DEG for each in angles)] == pytest.approx(expected, rel=1e-5)
+    assert found.j2 and own.limits == orbit.UNLIMITED
+
+
+@pytest.mark.parametrize(("names", "expected"), [
+    ({}, ("LEO", "GEO")),
+    ({"terminals.leo_name": "T7", "terminals.geo_name": "T7"}, ("T7 (own)", "T7 (partner)")),
+    ({"terminals.leo_name": "GEO"}, ("GEO (own)", "GEO (partner)")),
+])  # fmt: skip
+def test_terminals_of_one_name_are_told_apart(tmp_path, names, expected):
+    pair = pair_of(tmp_path, names)
+    assert (pair.leo.name, pair.geo.name) == (pair.leo.orbit.name, pair.geo.orbit.name) == expected
+
+
+SETS = {"kind": "elements", "file": "a.tle"}
+FAR = orbit.GeostationarySlot("far", orbit.Epoch(EPOCH), 1.0)
+
+
+@pytest.mark.parametrize(("leo", "duration", "epoch", "tail_s"), [
+    ({"day": 79.5 - 13.0}, "6 h", EPOCH, 64800.0),  # a quarter of the day before 14 days are over, from 13.25 on
+    ({"day": 79.5 - 13.5}, "12 h", EPOCH, 0.0),
+    ({"day": 79.5 + 13.0}, "6 h", EPOCH, 86400.0),
+    ({"day": 79.5 - 12.0}, "30 h", EPOCH, 64800.0),
+    ({"day": 79.5, "revolutions": 16.5, "eccentricity": 1}, "1 h", EPOCH, 86400.0),
+    (None, "1 h", "2050-12-30T20:00:00Z", 86400.0),
+    (None, "30 h", "2050-12-30T20:00:00Z", 0.0),  # the rotation of the Earth is known to the end of 2050
+])  # fmt: skip
+def test_orbits_hold_for_a_day_behind_the_span_or_as_long_as_they_do(tmp_path, leo, duration, epoch, tail_s):
+    given = {"orbit.duration": duration, "orbit.epoch": epoch}
+    if leo is not None:
+        (tmp_path / "a.tle").write_text(element_set(**leo), encoding="utf-8")
+        given["orbit.leo"] = SETS
+    assert pair_of(tmp_path, given).tail_s == pytest.approx(tail_s, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("end", "duration", "tail_s"), [(21600.0, "5 h", 3600.0), (21600.0, "6 h", 0.0), (2e5, "6 h", 86400.0)]
+)
+@pytest.mark.parametrize("which", ["leo", "geo"])
+def test_an_ephemeris_holds_as_far_as_it_reaches_whichever_end_it_is(tmp_path, which, end, duration, tail_s):
+    own = pair_of(tmp_path).leo.orbit if which == "leo" else FAR
+    (tmp_path / "a.oem").write_text(ephemeris(own, np.arange(0.0, end + 1.0, 400.0)), encoding="utf-8")
+    given = {f"orbit.{which}": {"kind": "ephemeris", "file": "a.oem"}, "orbit.duration": duration}
+    assert pair_of(tmp_path, given).tail_s == tail_s
+    with pytest.raises(orbit.OrbitError) as refused:
+        pair_of(tmp_path, given | {"orbit.duration": "56 h"})
+    words = f"orbit.{which}: {tmp_path / 'a.oem'}: the ephemeris of EXAMPLE 1 may be used from 2026-03-20T12:00"
+    assert str(refused.value).startswith(words)
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"orbit.epoch": "2060-02-28T00:00:00Z"}, "orbit.epoch: '2060-02-28T00:00:00Z' is outside 1973-01-02 to 2050"),
+    ({"orbit.leo": SETS}, "orbit.leo: FOLDER/a.tle: there is no such file; check the path: a name in a mission is "
+     "seen"),
+    ({"orbit.geo": {"kind": "ephemeris", "file": "b.oem"}}, "orbit.geo: FOLDER/b.oem: there is no such file"),
+    ({"orbit.leo": {**KEPLERIAN, "semi_major_axis": "6400 km"}}, "orbit.leo: "),
+    ({"orbit.leo": {**SETS, "file": "two.tle"}}, "orbit.leo: FOLDER/two.tle, line 2: 2 element sets of different "
+     "satellites, ONE (70001), TWO (70002); name one of them, by its number where names repeat"),
+    ({"orbit.leo": {**SETS, "file": "two.tle", "object": "THREE"}}, "orbit.leo: FOLDER/two.tle: none of its 2 element "
+     "sets is of 'THREE'; nearest are TWO, ONE: name one of them, or a catalogue number"),
+])  # fmt: skip
+def test_an_orbit_that_is_none_is_told_with_its_table(tmp_path, changes, words):
+    two = element_set(name="ONE") + element_set(name="TWO", number="70002")
+    (tmp_path / "two.tle").write_text(two, encoding="utf-8")
+    with pytest.raises(orbit.OrbitError) as refused:
+        pair_of(tmp_path, changes)
+    assert str(refused.value).replace(str(tmp_path), "FOLDER").startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("number", "object_name", "revolutions"), [("70002", "70002", 15.3), ("70002", "two", 15.3), ("70001", "ONE", 15.2)]
+)
+def test_of_a_file_of_two_satellites_the_named_one_flies(tmp_path, number, object_name, revolutions):
+    two = element_set(name="ONE") + element_set(name="TWO", number="70002", revolutions=15.3)
+    (tmp_path / "a.tle").write_text(two, encoding="utf-8")
+    pair = pair_of(tmp_path, {"orbit.leo": {**SETS, "object": object_name}})
+    found = pair.leo.orbit.elements
+    assert (found.catalogue_number, found.mean_motion_rad_s * 43200.0 / math.pi) == (number, pytest.approx(revolutions))
+
+
+# ---------------------------------------------------------------------------------------------- an ellipse that drifts
+DRIFTING = orbit.KeplerOrbit("drifting", orbit.Epoch(EPOCH), 9.2e6, 0.26, 1.1, 0.7, 2.3, 4.1, True)
+
+
+def test_the_flattening_turns_an_ellipse_as_the_perturbing_function_says():
+    """Kaula's secular rates, with J2 = 1.0826e-3, R = 6378.137 km and mu = 398600.4418 km^3/s^2."""
+    mean = math.sqrt(3.986004418e14 / 9.2e6**3)
+    shape, cosine = 1.0 - 0.26**2, math.cos(1.1)
+    part = 0.75 * 1.08262668e-3 * mean * (6378137.0 / 9.2e6) ** 2 / shape**2
+    motion = mean + part * math.sqrt(shape) * (3.0 * cosine**2 - 1.0)
+    expected = (-2.0 * part * cosine, part * (5.0 * cosine**2 - 1.0), motion)
+    assert DRIFTING.secular_rates_rad_s() == pytest.approx(expected, rel=1e-5)
+    assert replace(DRIFTING, j2=False).secular_rates_rad_s() == (0.0, 0.0, pytest.approx(mean, rel=1e-9))
+
+
+@pytest.mark.parametrize("j2", [True, False])
+def test_the_velocity_on_an_ellipse_is_the_rate_of_its_position(j2):
+    own, time_s = replace(DRIFTING, j2=j2), np.array([-9e4, 0.0, 1234.5, 5e5])
+    slope = (own.states(time_s + 0.5).position_m - own.states(time_s - 0.5).position_m) / 1.0
+    np.testing.assert_allclose(own.states(time_s).velocity_m_s, slope, atol=2e-3)
+    node, perigee, motion = (rate * 5e5 for rate in own.secular_rates_rad_s())
+    moved = replace(own, node_rad=0.7 + node, argument_of_perigee_rad=2.3 + perigee, mean_anomaly_rad=4.1 + motion)
+    for of, other in zip(moved.states(np.array([0.0])), own.states(np.array([5e5])), strict=True):
+        np.testing.assert_allclose(of, other, rtol=1e-9)
+    radius = np.linalg.norm(own.states(np.array([0.0])).position_m)
+    anomaly = 4.1
+    for _ in range(100):
+        anomaly = 4.1 + 0.26 * math.sin(anomaly)
+    assert radius == pytest.approx(9.2e6 * (1.0 - 0.26 * math.cos(anomaly)), rel=1e-9)

@@ -9,11 +9,14 @@ import pytest
 from day_files import ALONE, EPOCH, KEPLERIAN, day_file, ephemeris
 from microrad import orbit
 from microrad.link import study as link_study
+from microrad.mission.file import load_link
+from microrad.mission.presets import preset_text
 from microrad.orbit import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, Swing
-from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, _outline, ground_track
+from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, _moves, _outline, ground_track
 from microrad.report.day.figures import day_figures
+from optical_files import optical
 
 SIX_HOURS = {"orbit.duration": "6 h", **ALONE}
 HIGH = {"kind": "circular", "altitude": "8000 km", "inclination": "30 deg", "node": "0 deg", "phase": "0 deg"}
@@ -196,3 +199,59 @@ def test_a_side_that_is_as_it_is_has_no_words(drawn):
 def test_the_map_of_more_than_a_day_says_so(drawn):
     _, figures = drawn({"orbit.duration": "30 h"})
     assert "in the first 24 h of the span" in figures["world-map"].caption
+
+
+# ------------------------------------------------------------------------------------- two of each, unlike each other
+def way_of(name, *spans):
+    return SimpleNamespace(name=name, contacts=[orbit.Contact(*span, "", "") for span in spans])
+
+
+OTHER = {"latitude": "-33.5 deg", "longitude": "-70.25 deg", "height": "700 m", "mask": "12 deg"}
+
+
+def test_a_track_has_each_way_and_each_station_in_its_place(tmp_path):
+    north = "operations.downlink.stations.other"
+    m = day_file(tmp_path, ALONE, {"orbit.duration": "3 h", north: OTHER}, optical(0.5, data_rate="1 Gbit/s")).mission
+    pair = orbit.pair(m.orbit, m.terminals, tmp_path)
+    ways = way_of("relay", (60.0, 90.0), (95.0, 119.9), (10770.0, 99999.0)), way_of("direct"), way_of("3", (-9.0, 0.0))
+    seen = SimpleNamespace(pair=pair, duration_s=pair.span_s[1])
+    track = ground_track(seen, ways, m.operations.downlink, m.operations.optical)
+    assert track.time_s.tolist() == [30.0 * k for k in range(360)]
+    assert {name: np.flatnonzero(there).tolist() for name, there in track.open.items()} == {
+        "relay": [2, 3, 359], "direct": [], "3": [0]
+    }  # fmt: skip
+    assert [s.name for s in track.stations] == ["kiruna", "other", "kiruna", "tromso", "tenerife"]
+    places = [math.degrees(x[0]) for s in track.stations for x in (s.latitude_rad, s.longitude_rad)]
+    assert places == pytest.approx([67.85713, 20.96433, -33.5, -70.25, 67.86, 20.96, 69.66, 18.94, 28.3, -16.5])
+    only = ground_track(seen, (), None, m.operations.optical)
+    assert ([s.name for s in only.stations], only.open) == (["kiruna", "tromso", "tenerife"], {})
+    height = mean_radius_m(track, pair)
+    for each, mask in zip(track.stations, (5.0, 12.0, 5.0, 5.0, 10.0), strict=True):
+        up = unit(each.latitude_rad, each.longitude_rad)
+        line = around(each) * height - up * EARTH_RADIUS_M
+        elevation = np.arcsin(np.sum(line * up, axis=0) / np.linalg.norm(line, axis=0))
+        assert np.degrees(elevation) == pytest.approx(np.full(elevation.size, mask), abs=1e-6)
+
+
+def test_the_track_of_a_link_to_a_station_has_it_first_whichever_end_it_is(tmp_path):
+    (tmp_path / "ground.toml").write_text(preset_text("ground-downlink"), encoding="utf-8")
+    m, heard = load_link(tmp_path / "ground.toml").mission, day_file(tmp_path, ALONE).mission.operations.downlink
+    pair = orbit.pair(m.orbit, m.terminals, tmp_path)
+    tracks = [
+        ground_track(SimpleNamespace(pair=own, duration_s=7200.0), (), heard)
+        for own in (pair, orbit.Pair(pair.epoch, pair.earth, pair.geo, pair.leo, pair.span_s, pair.tail_s))
+    ]
+    for track in tracks:
+        assert ([s.name for s in track.stations], track.relay, track.time_s.size) == (["Tenerife", "kiruna"], None, 240)
+        np.testing.assert_array_equal(track.latitude_rad, tracks[0].latitude_rad)
+    assert np.ptp(tracks[0].latitude_rad) > 1.0
+
+
+@pytest.mark.parametrize(("latitude", "longitude", "moves"), [
+    ([60.0, 60.0], [10.0, 11.9], False), ([60.0, 60.0], [10.0, 12.1], True), ([0.0, 0.0], [-179.6, 179.6], False),
+    ([0.0, 0.0], [0.0, 1.01], True), ([80.0, 80.9], [0.0, 2.4], False), ([80.0, 80.9], [0.0, 3.4], True),
+    ([0.0, 0.6, -0.6], [5.0, 5.7, 4.3], False), ([0.0, 0.75, 0.0], [5.0, 5.7, 5.0], True),
+    ([-70.0, -71.1], [3.0, 3.0], True),
+])  # fmt: skip
+def test_a_point_moves_by_more_than_a_degree_on_the_sphere(latitude, longitude, moves):
+    assert _moves(np.radians(latitude), np.radians(longitude)) == moves

@@ -327,3 +327,59 @@ def test_clouds_of_a_network_that_know_nothing_of_each_other_are_tied_by_500_km(
         sides = next(s for name, *s in assumptions._changes(own, None) if name == "correlation length of clouds")
         assert [None if side is None else side[0] for side in sides] == [low, high]
         assert sides[1][1].operations.optical.correlation_length_m == pytest.approx(float(high.split()[0]) * 1e3)
+
+
+# --------------------------------------------------------------------------------------- sites all unlike each other
+UNLIKE_SITES = {
+    "orbit.epoch": "2026-03-31T12:00:00Z", "orbit.duration": "30 h", "operations.runs": 3, "operations.seed": 7,
+    "operations.store": "6 GB", "operations.instrument_rate": "2.5 Mbit/s",
+}  # fmt: skip
+UNLIKE_SKY = {"kiruna": [0.41, 0.5, 0.62] + [0.3 + 0.04 * k for k in range(9)], "tromso": 0.37, "tenerife": 0.83}
+UNLIKE_NETWORK = {"data_rate": "622.08 Mbit/s", "setup": "47 s", "delay": "2.5 s", "weather": "50 min"}
+
+
+@pytest.fixture(scope="module")
+def unlike(tmp_path_factory):
+    """Way and sky of a network whose numbers are all unlike each other, over the end of a month."""
+    folder = tmp_path_factory.mktemp("unlike")
+    o, pair = of(folder, UNLIKE_SITES, optical(UNLIKE_SKY, correlation_length="1300 km", **UNLIKE_NETWORK))
+    return network.optical(o, pair, network.optical_passes(o.optical, pair)), network.sky(o, pair)
+
+
+def history_of(way):
+    ends = (getattr(way.history, key)[-1] for key in ("generated_bit", "lost_bit", "delivered_bit", "time_s"))
+    return [*ends, way.history.stored_bit.max()]
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda way, sky: [c.start_s for c in way.contacts],
+     [272.867643, 29946.2773, 29971.1086, 35567.6424, 35590.0418, 41227.4272, 41970.3507, 52435.1209, 69051.0148,
+      74696.0038, 85499.8096]),
+    (lambda way, sky: [c.end_s - c.start_s for c in way.contacts],
+     [302.991055, 441.025903, 452.677159, 553.981634, 558.051409, 526.980624, 437.012704, 393.406764, 550.277575,
+      539.201171, 397.748764]),
+    (lambda way, sky: way.carried_bit,
+     [159246916000.0, 81705211300.0, 84121215700.0, 185035466000.0, 20962696000.0, 99528782100.0, 161746068000.0,
+      143661813000.0, 104359638000.0, 194379749000.0, 218193791000.0]),
+    (lambda way, sky: [way.contact_s, way.gap_s, way.capacity_bit, *way.capacity_spread_bit],
+     [2742.20343, 36824.769, 1452941350000.0, 1045142090000.0, 1932414290000.0]),
+    (lambda way, sky: [way.generated_bit, way.lost_bit, way.on_board_bit, way.arrived_bit, way.failed_contacts],
+     [270000000000.0, 50966574800.0, 0.0, 219033425000.0, 0.0]),
+    (lambda way, sky: [way.median_s, way.slow_s], [15276.3693, 38013.1702]),
+    (lambda way, sky: history_of(way),
+     [270000000000.0, 46853063200.0, 223146937000.0, 194400.0, 48000000000.0]),
+    (lambda way, sky: [*sky.availability, *sky.drawn, sky.any_drawn, sky.any_independent],
+     [0.428, 0.37, 0.83, 0.42962963, 0.314814815, 0.851851852, 0.916666667, 0.9387388]),
+    (lambda way, sky: sky.correlation.ravel(),
+     [1.0, 0.846737445, 0.0205471414, 0.846737445, 1.0, 0.0193633075, 0.0205471414, 0.0193633075, 1.0]),
+])  # fmt: skip
+def test_a_network_of_sites_unlike_each_other(unlike, found, expected):
+    assert list(found(*unlike)) == pytest.approx(expected, rel=1e-6, abs=0.0)
+
+
+def test_the_contacts_of_a_network_name_their_stations(unlike):
+    way, sky = unlike
+    assert (way.name, sky.names) == ("optical downlink", ("kiruna", "tromso", "tenerife"))
+    assert [c.begins for c in way.contacts] == [f"elevation mask of {name}" for name in way.stations]
+    north = "tromso kiruna tromso kiruna kiruna"
+    assert " ".join(way.stations) == f"tenerife {north} tenerife tromso kiruna kiruna tenerife"

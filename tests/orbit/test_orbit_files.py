@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import BarycentricInterpolator
 from sgp4.api import WGS72, Satrec
 from sgp4.exporter import export_omm, export_tle
 from skyfield.api import EarthSatellite, load
@@ -1355,3 +1356,527 @@ def test_a_time_that_is_no_number_is_refused_as_such_by_an_ephemeris(tmp_path, t
         orbit.states(np.array([700.0, time_s]))
     with pytest.raises(OrbitError, match="a time is not a finite number; give seconds since"):
         orbit.require(700.0, time_s)
+
+
+# ------------------------------------------------------------------------------------------------ refusals as a whole
+WHOLE = """
+TLE short line -> FILE, line 1: line 1 of an element set has 69 characters, this one 68; copy it whole, with all its
+  spaces
+TLE long line -> FILE, line 2: line 2 of an element set has 69 characters, this one 70; copy it whole, with all its
+  spaces
+TLE checksum of line 1 -> FILE, line 2: the checksum of line 1 is 8, but its characters sum to 7; a character is
+  wrong: download the elements again
+TLE no line number 1 -> FILE, line 2: line 1 of an element set must stand here and begin with '1 ', but the line
+  begins with '  90001U 260'; restore the line, with its number
+TLE line 2 missing -> FILE, line 3: line 2 of an element set must stand here and begin with '2 ', but the line begins
+  with 'B'; restore the line, with its number
+TLE cut off -> FILE, line 1: the file ends where line 2 of an element set must follow; it is cut off, or no element
+  set: download it again
+TLE name alone -> FILE, line 1: the file ends where line 1 of an element set must follow; it is cut off, or no element
+  set: download it again
+TLE catalogue numbers -> FILE, line 1: line 1 is of catalogue number 90001, the line below it of 90002; put the two
+  lines of one satellite together
+TLE letters in line 2 -> FILE, line 2: the inclination in columns 9 to 16 is ' 9x.4000', and digits belong there;
+  download the elements again
+TLE day 367 -> FILE, line 1: the epoch, day 367.50000000 of 2026, is refused: the day of the year must be from 1 to
+  366; download the elements again
+TLE SGP4-XP -> FILE, line 1: the type of the ephemeris is 4, elements of another theory than SGP4 (4 is SGP4-XP),
+  which SGP4 would misread by kilometres; take elements of type 0
+TLE inclination 190 -> FILE, line 1 (90001): the inclination is 190, and an orbit about the Earth has 0 to 180 deg;
+  download the elements again
+TLE mean motion 0 -> FILE, line 1 (90001): the mean motion is 0, and an orbit about the Earth has 0.001 to 20
+  revolutions a day; download the elements again
+TLE comments alone -> FILE: no element set is in the file; give a TLE or an OMM
+TLE empty -> FILE: the file is empty; download or export it again
+TLE blank -> FILE: the file holds blanks and nothing else; download or export it again
+TLE nul -> FILE: byte 8 is not text in UTF-8, so this is a binary or a compressed file; unpack it, or export element
+  sets (TLE, OMM) or an ephemeris (OEM) as text
+TLE ephemeris -> FILE, line 1: the file begins with CCSDS_OEM_VERS, not with CCSDS_OMM_VERS; give a CCSDS Orbit
+  Mean-Elements Message, and an ephemeris (OEM) by its own key
+OMM twice -> FILE, line 26: BSTAR is '3', but line 23 has '1e-05'; keep one of them
+OMM leap second -> FILE, line 11: EPOCH is '2026-03-20T23:59:60', a second that does not exist: '2026-03-20T23:59:60Z'
+  names a leap second, but none was inserted on that day; write the instant in UTC, for example "2026-03-20T12:00:00Z"
+OMM line -> FILE, line 26: 'what is this' is neither 'KEY = value' nor a keyword that may stand here; repair or remove
+  the line
+OMM no version -> FILE, line 1: the file begins with CREATION_DATE, not with CCSDS_OMM_VERS; give a CCSDS Orbit
+  Mean-Elements Message, and an ephemeris (OEM) by its own key
+OMM bomb -> FILE, line 2: a document type (DOCTYPE) is declared, which no CCSDS message has and which can make a
+  parser expand text without end; remove it
+OMM deep JSON -> FILE: JSON nested too deeply or a number too long for element sets; give OMM records
+OMM JSON list -> FILE, entry 1: '1' is not an object with the keys of an OMM; repair it
+OMM CSV -> FILE, line 3: 2 values, but the first line names 17 columns; repair it
+OMM drag -> FILE, line 1 (EXAMPLE 1): the drag term B* is 1e+308, and an orbit about the Earth has less than 1 per
+  radius of the Earth, either sign; download the elements again
+OMM a key without a value -> FILE, entry 1: EPOCH is missing in this mean-elements message; add it or export it again
+OEM no OBJECT_ID -> FILE, line 6: OBJECT_ID is missing in this segment's metadata; add it
+OEM XML no STOP_TIME -> FILE, line 3: STOP_TIME is missing in this segment's metadata; add it
+OEM centre -> FILE, line 9: CENTER_NAME is 'MARS'; read are EARTH: export one of these
+OEM Z in TAI -> FILE, line 12: START_TIME is '2026-03-20T12:00:00.000000Z' and ends in Z, which means UTC, but
+  TIME_SYSTEM is TAI; remove the Z or correct TIME_SYSTEM
+OEM leap second of TAI -> FILE, line 13: STOP_TIME is '2016-12-31T23:59:60', a second that does not exist: TAI has no
+  leap seconds
+OEM nan -> FILE, line 20: the state vector at 2026-03-20T12:04:00.000000 holds nan, inf or a number beyond 1e+300;
+  remove or repair it
+OEM columns -> FILE, line 20: 8 columns; a state vector has a time, three of position in km and three of velocity in
+  km/s, and may have three of acceleration
+OEM too few for Lagrange -> FILE, line 6: 8 state vectors in this segment, too few for LAGRANGE interpolation of
+  degree 8, which takes 9; add state vectors or lower INTERPOLATION_DEGREE
+OEM overlap -> FILE, line 76: this segment may be used from 2026-03-20T12:40:00.000Z, but the one before it until
+  2026-03-20T12:59:00.000Z, so the orbit is stated twice; sort the segments by time and let USEABLE_START_TIME and
+  USEABLE_STOP_TIME meet
+OEM version -> FILE, line 1: the file begins with CCSDS_OEM_VERS = '4.0', not with CCSDS_OEM_VERS = 1, 2 or 3; give a
+  CCSDS Orbit Ephemeris Message
+OEM no segment -> FILE: no segment of an ephemeris (META_START to META_STOP, or <segment>) is in the file; give a
+  CCSDS OEM, and element sets (TLE, OMM) by their own key
+OEM cut in the metadata -> FILE: the file ends before META_STOP; it is cut off: download or export it again
+OEM order -> FILE, line 6: META_STOP has no place here; repair the order of the blocks
+"""
+REFUSED_WHOLE = [line.split(" -> ") for line in WHOLE.replace("\n  ", " ").strip().split("\n")]
+
+
+@pytest.mark.parametrize(("fault", "words"), REFUSED_WHOLE, ids=[fault for fault, _ in REFUSED_WHOLE])
+def test_a_refusal_of_a_file_is_one_whole_sentence(tmp_path, fault, words):
+    kind, name = fault.split(" ", 1)
+    text = {"TLE": TLE_FAULTS, "OMM": OMM_FAULTS, "OEM": OEM_FAULTS}[kind][name][0]
+    path = write(tmp_path, text)
+    with pytest.raises(OrbitError) as caught:
+        read_oem(path, EPOCH) if kind == "OEM" else read_elements(path)
+    assert str(caught.value).replace(str(path), "FILE") == words
+
+
+# ---------------------------------------------------------------------------------- elements all unlike each other
+def fields_of(found):
+    """The numbers of a set as files state them: revolutions a day, the eccentricity, four angles in degrees, B*."""
+    angles = (found.inclination_rad, found.node_rad, found.argument_of_perigee_rad, found.mean_anomaly_rad)
+    motion = found.mean_motion_rad_s * 43200.0 / math.pi
+    return [motion, found.eccentricity, *map(math.degrees, angles), found.drag_per_earth_radius]
+
+
+@pytest.mark.parametrize(("drag", "value"), [
+    ("-11606-4", -0.11606e-4),
+    (" 34567-2", 0.34567e-2),
+    ("+ 2345+0", 0.02345),
+    (" 00000 0", 0.0),
+    ("-98765 0", -0.98765),
+])  # fmt: skip
+def test_two_lines_of_numbers_unlike_each_other_behind_another_satellite(tmp_path, drag, value):
+    one = summed(f"1 A1234C 98067BQ  23271.56789012 -.00012345  67890-6 {drag} 0  4321")
+    two = summed("2 A1234  51.6443 211.2001 0007417  17.6667 285.9053 15.49560532 1234")
+    text = f"# of today\n{NAMED}\n0 SECOND SAT \n{one}  \n\n# between\n{two}\n"
+    _, found = elements(tmp_path, text)
+    motion = 15.49560532
+    assert fields_of(found) == pytest.approx(
+        [motion, 0.0007417, 51.6443, 211.2001, 17.6667, 285.9053, value], rel=1e-12
+    )
+    assert (found.name, found.catalogue_number, found.place) == ("SECOND SAT", "A1234", f"{tmp_path / 'a.txt'}, line 7")
+    assert found.epoch.text == "2023-09-28T13:37:45.706368Z"
+    assert [e.name for e in read_elements(tmp_path / "a.txt", "a1234")] == ["SECOND SAT"]
+
+
+UNLIKE = dict(FIELDS) | {
+    "OBJECT_NAME": "SECOND SAT", "NORAD_CAT_ID": "0040123", "EPOCH": "2025-060T07:08:09.25", "EPHEMERIS_TYPE": "3",
+    "MEAN_MOTION": "2.00561234", "ECCENTRICITY": "0.0123", "INCLINATION": "55.25", "RA_OF_ASC_NODE": "120.5",
+    "ARG_OF_PERICENTER": "33.75", "MEAN_ANOMALY": "327.125", "BSTAR": "-0.00045",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("notation", "place"), [("kvn", 26), ("units", 26), ("xml", 27), ("json", 2), ("csv", 3)])
+def test_a_second_message_of_numbers_unlike_each_other(tmp_path, notation, place):
+    first, second = (NOTATIONS[notation](fields) for fields in (FIELDS, UNLIKE))
+    text = first + second
+    if notation == "xml":
+        text = first.replace("</ndm>", "\n") + second.partition("<ndm>")[2]
+    elif notation == "json":
+        text = json.dumps([*json.loads(first), *json.loads(second)])
+    elif notation == "csv":
+        text = first + second.split("\n", 1)[1]
+    _, found = elements(tmp_path, text)
+    numbers = [2.00561234, 0.0123, 55.25, 120.5, 33.75, 327.125, -0.00045]
+    assert fields_of(found) == pytest.approx(numbers, rel=1e-12)
+    assert (found.name, found.catalogue_number) == ("SECOND SAT", "40123")
+    assert found.epoch.text == "2025-03-01T07:08:09.25Z"
+    assert found.place == f"{tmp_path / 'a.txt'}, {'entry' if notation == 'json' else 'line'} {place}"
+
+
+@pytest.mark.parametrize(("notation", "changes", "words"), [
+    ("kvn", {"BSTAR": "x"}, "line 48: BSTAR is 'x', not a finite number"),
+    ("kvn", {"MEAN_MOTION": "2 [rad/s]"}, "line 37: MEAN_MOTION is in 'rad/s'; write it in 'rev/day'"),
+    ("kvn", {"BSTAR": "1e-5 [1/m]"}, "line 48: BSTAR is in '1/m'; write it in '1/ER'"),
+    ("kvn", {"RA_OF_ASC_NODE": "-inf"}, "line 40: RA_OF_ASC_NODE is '-inf', not a finite number"),
+    ("kvn", {"ECCENTRICITY": ""}, "line 26: ECCENTRICITY is missing in this mean-elements message; add it or"),
+    ("json", {"TIME_SYSTEM": "UT1"}, "entry 2: TIME_SYSTEM is 'UT1'; SGP4 takes UTC: export the elements so"),
+    ("json", {"REF_FRAME": "GCRF"}, "entry 2: REF_FRAME is 'GCRF'; SGP4 takes TEME or TEMEOFDATE: export the"),
+    ("json", {"MEAN_ELEMENT_THEORY": "DSST"}, "entry 2: MEAN_ELEMENT_THEORY is 'DSST'; SGP4 takes SGP4 or"),
+    ("json", {"EPOCH": "2025-366T00:00:00"}, "entry 2: EPOCH is '2025-366T00:00:00', not a date and time; write"),
+    ("json", {"EPOCH": "2055-01-01T00:00:00"}, "entry 2: EPOCH: '2055-01-01T00:00:00Z' is outside 1973-01-02 to"),
+    ("json", {"EPHEMERIS_TYPE": "6"}, "entry 2: the type of the ephemeris is 6, elements of another theory than"),
+    ("json", {"INCLINATION": "180.5"}, "entry 2 (SECOND SAT): the inclination is 180.5, and an orbit about the"),
+])  # fmt: skip
+def test_a_fault_of_a_second_message_is_told_in_its_place(tmp_path, notation, changes, words):
+    fields = UNLIKE | changes
+    text = json.dumps([FIELDS, fields]) if notation == "json" else kvn(FIELDS) + kvn(fields)
+    message = refused(tmp_path, text)
+    assert message.startswith(f"{tmp_path / 'a.txt'}, {words}")
+
+
+@pytest.mark.parametrize(("line", "field"), [
+    ("  mean_motion=15.5", ("MEAN_MOTION", "15.5", "")),
+    ("A1_b = -1.5e-3 [ km / s ]  ", ("A1_B", "-1.5e-3", " km / s ")),
+    ("NAME = SAT [B]", ("NAME", "SAT [B]", "")),
+    ("NAME = .5[deg]", ("NAME", ".5", "deg")),
+    ("KEY = a = b", ("KEY", "a = b", "")),
+    ("KEY =", ("KEY", "", "")),
+    ("KEY = 12 [", ("KEY", "12 [", "")),
+    ("KEY = 7 []", ("KEY", "7", "")),
+    ("1KEY = 7", None),
+    ("KEY 7", None),
+    ("= 7", None),
+    ("TWO KEYS = 7", None),
+])  # fmt: skip
+def test_a_line_of_a_keyword_is_its_key_value_and_unit(line, field):
+    if field is not None:
+        assert messages.kvn_field(Path("f"), 17, line) == (*field, "line 17")
+    else:
+        words = (
+            f"f, line 17: {line.strip()!r} is neither 'KEY = value' nor a keyword that may stand here; repair or remove"
+        )
+        with pytest.raises(OrbitError, match=re.escape(words)):
+            messages.kvn_field(Path("f"), 17, line)
+
+
+def test_xml_is_told_as_fields_and_containers_in_their_order(monkeypatch):
+    text = (
+        "<?xml version='1.0'?>\n<n:omm xmlns:n='urn:a' version='2.0'>\n<a units='km'> 1.5\n</a><b/>\n"
+        "<n:c version='3'>x<d units='s' version='4'>2&amp;3</d>tail</n:c>\n<e>f<!-- no -->g</e></n:omm>\n"
+    )
+    found = [tuple(each) for each in messages.xml_fields(Path("f"), text)]
+    assert found == [
+        ("<omm", "", "", "line 2"), ("a", "1.5", "km", "line 3"), ("b", "", "", "line 4"), ("<c", "", "", "line 5"),
+        ("d", "2&3", "s", "line 5"), ("</c", "", "", "line 5"), ("e", "fg", "", "line 6"), ("</omm", "", "", "line 2"),
+    ]  # fmt: skip
+
+
+# ------------------------------------------------------------------------------------------------------------- instants
+NEAR_LEAP = Epoch("2016-12-31T23:59:50.25Z")
+
+
+@pytest.mark.parametrize(("system", "text", "expected"), [
+    ("UTC", "2016-12-31T23:59:60.5", 10.25),
+    ("UTC", "2017-001T00:00:02", 12.75),
+    ("UTC", "2016-12-30T23:59:50.25", -86400.0),
+    ("TAI", "2017-01-01T00:00:37", 10.75),  # midnight of UTC: a second was inserted before it, TAI - UTC is 37 s
+    ("TAI", "2017-01-01T00:00:26.25", 0.0),  # 23:59:50.25 and 36 s
+    ("TT", "2017-01-01T00:00:58.434", 0.0),  # and 32.184 s more
+    ("TDT", "2017-01-02T00:00:58.434", 86400.0),
+    ("GPS", "2017-01-01T00:00:07.25", 0.0),  # 19 s less than TAI
+    ("GPS", "2016-12-31T00:00:07.25", -86400.0),
+])  # fmt: skip
+def test_instants_about_a_leap_second_are_elapsed_seconds(system, text, expected):
+    given = messages.instant(Path("f"), messages.Field("EPOCH", text, "", "line 3"), system)
+    other = messages.instant(Path("f"), messages.Field("EPOCH", "2017-06-01T00:00:00", "", "line 4"), system)
+    found = messages.elapsed_s(system, NEAR_LEAP, [other, given], "f, line 3")
+    assert found[1] == pytest.approx(expected, abs=1e-9)
+    assert found[0] - found[1] > 100 * 86400.0
+
+
+@pytest.mark.parametrize(("text", "found"), [
+    ("2024-366T23:59:59.75", (738886 + 365, 86399.75)),
+    ("2024-12-31T01:02:03", (738886 + 365, 3723.0)),
+    ("2024-060T00:00:07.", (738886 + 59, 7.0)),
+    ("2024-02-29T10:20:30.125Z", (738886 + 59, 37230.125)),
+    *(
+        (text, None)
+        for text in (
+            "2023-366T00:00:00", "2023-02-29T00:00:00", "2024-1-01T00:00:00", "2024-01-01", "2024-01-01T1:00:00",
+            "2024-01-01T24:00:00", "2024-01-01T00:00:00+00:00", "2024-000T00:00:00", "20240101T00:00:00",
+        )
+    ),
+])  # fmt: skip
+def test_a_time_code_is_a_day_and_seconds_in_it(text, found):
+    given = messages.Field("START_TIME", text, "", "line 9")
+    if found is not None:
+        assert messages.instant(Path("f"), given, "UTC") == found
+    else:
+        words = (
+            f"f, line 9: START_TIME is '{text}', not a date and time; write it as 2026-03-20T12:00:00.000 or 2026-079T"
+        )
+        with pytest.raises(OrbitError, match="^" + re.escape(words)):
+            messages.instant(Path("f"), given, "UTC")
+
+
+# ------------------------------------------------------------------------------------ segments all unlike each other
+PARTS = (  # times, motion, and what the metadata say: the parts of an ephemeris, one behind the other
+    (GRID[:30], 1.1e-3, {"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "5", "USEABLE_STOP_TIME": stamp(1700)}),
+    (GRID[28:60], 1.05e-3, {"REF_FRAME": "GCRF", "USEABLE_START_TIME": stamp(1700), "INTERPOLATION_DEGREE": "3"}),
+    (GRID[65:] + 7.0, 0.9e-3, {"REF_FRAME": "ITRF", "INTERPOLATION": "Hermite", "INTERPOLATION_DEGREE": "10"}),
+)
+
+
+def parted(*changes):
+    """The ephemeris of the parts, in KVN; ``changes`` of the metadata of each."""
+    return HEAD + "".join(
+        segment(time_s, truth(time_s, rate), **given | more)
+        for (time_s, rate, given), more in zip(PARTS, changes or ({}, {}, {}), strict=True)
+    )
+
+
+def test_parts_of_an_ephemeris_are_each_interpolated_in_their_own_way(tmp_path):
+    orbit = ephemeris(tmp_path, parted())
+    kinds = [(s.method, s.points, s.start_s, s.stop_s, s.time_s.size) for s in orbit.segments]
+    assert kinds == [
+        ("LAGRANGE", 6, 0.0, 1700.0, 30), ("HERMITE", 2, 1700.0, 3540.0, 32), ("HERMITE", 6, 3907.0, 6007.0, 36)
+    ]  # fmt: skip
+    assert (orbit.name, orbit.source, orbit.epoch) == ("EXAMPLE 1", str(tmp_path / "a.txt"), EPOCH)
+    time_s = np.array([5000.5, 1699.9, 3540.0, 30.0, 1700.0, 3907.0, 2500.5, 6007.0, 0.0])
+    found = orbit.states(time_s)
+    for k, which in enumerate((2, 0, 1, 0, 1, 2, 1, 2, 0)):
+        nodes, rate, given = PARTS[which]
+        alone = ephemeris(tmp_path, HEAD + segment(nodes, truth(nodes, rate), **given))
+        own = alone.states(time_s[k])
+        np.testing.assert_allclose(found.position_m[:, k], own.position_m, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(found.velocity_m_s[:, k], own.velocity_m_s, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("span", "held"), [
+    ((0.0, 3540.0), True), ((1000.0, 1700.0), True), ((1700.0, 1700.5), True), ((3907.0, 6007.0), True),
+    ((0.0, 3541.0), False), ((3540.0, 3907.0), False), ((3600.0, 3700.0), False), ((3906.0, 6007.0), False),
+    ((-1.0, 100.0), False), ((5000.0, 6008.0), False), ((0.0, 6007.0), False), ((3540.0, 3540.0), True),
+])  # fmt: skip
+def test_a_mission_is_held_by_parts_that_meet_and_not_over_a_gap(tmp_path, span, held):
+    orbit = ephemeris(tmp_path, parted())
+    if held:
+        orbit.require(*span)
+        return
+    with pytest.raises(OrbitError) as caught:
+        orbit.require(*span)
+    assert str(caught.value) == (
+        f"{tmp_path / 'a.txt'}: the ephemeris of EXAMPLE 1 may be used from 2026-03-20T12:00:00.000Z to "
+        "2026-03-20T12:28:20.000Z, 2026-03-20T12:28:20.000Z to 2026-03-20T12:59:00.000Z, 2026-03-20T13:05:07.000Z to "
+        f"2026-03-20T13:40:07.000Z, and the mission needs {EPOCH.utc(span[0])} to {EPOCH.utc(span[1])}; nothing is "
+        "extrapolated: choose an epoch and a duration inside, or take an ephemeris that covers them"
+    )
+
+
+@pytest.mark.parametrize(
+    ("time_s", "needs"),
+    [([100.0, 3600.0, 9000.0], "13:00:00.000Z; nothing"), ([-0.5], "11:59:59.500Z; n"), (6007.1, "13:40:07.100Z; n")],
+)
+def test_the_first_time_that_no_part_has_is_named_alone(tmp_path, time_s, needs):
+    with pytest.raises(OrbitError, match=re.escape(f"and the mission needs 2026-03-20T{needs}")):
+        ephemeris(tmp_path, parted()).states(np.array(time_s))
+
+
+@pytest.mark.parametrize(("number", "changes", "words"), [
+    (1, {"OBJECT_ID": None}, "line 49: OBJECT_ID is missing in this segment's metadata; add it"),
+    (1, {"REF_FRAME": "ITRF97 X"}, "line 53: REF_FRAME is 'ITRF97 X'; read are TEME, TOD"),
+    (1, {"TIME_SYSTEM": "UT1"}, "line 54: TIME_SYSTEM is 'UT1'; read are UTC, TAI, TT, GPS: export one of these"),
+    (1, {"STOP_TIME": "2026-03-20"}, "line 56: STOP_TIME is '2026-03-20', not a date and time; write it as"),
+    (1, {"USEABLE_START_TIME": stamp(1600)}, "line 49: this segment may be used from 2026-03-20T12:28:00.000Z, but "
+     "the one before it until 2026-03-20T12:28:20.000Z, so the orbit is stated twice; sort the segments by time"),
+    (1, {"USEABLE_START_TIME": stamp(3540)}, f"line 56: the usable span from {stamp(3540)} to {stamp(3540)} has "
+     f"nothing in common with the state vectors, {stamp(1680)} to {stamp(3540)}; correct USEABLE_START_TIME and "
+     "STOP_TIME"),
+    (2, {"INTERPOLATION_DEGREE": "26"}, "line 102: INTERPOLATION_DEGREE is '26'; take a whole number from 3 to 25"),
+    (2, {"INTERPOLATION_DEGREE": "7 [1]"}, None),
+    (2, {"INTERPOLATION_DEGREE": None}, "line 101: INTERPOLATION stands without INTERPOLATION_DEGREE; add"),
+    (2, {"INTERPOLATION": "SPLINE"}, "line 101: INTERPOLATION is 'SPLINE'; an orbit is read with HERM"),
+    (2, {"REF_FRAME": "TOD_Earth", "REF_FRAME_EPOCH": "2000-01-01"}, "line 103: REF_FRAME_EPOCH holds TOD still at "
+     "2000-01-01, and only the frame of date is read; export in EME2000 or GCRF"),
+    (2, {"REF_FRAME": "TEME", "START_TIME": stamp(9e3)}, f"line 100: the usable span from {stamp(9e3)} to "),
+    (2, {"OBJECT_NAME": "B"}, ": it holds the objects EXAMPLE 1 (2026-001A), B (2026-001A), and no object is"),
+])  # fmt: skip
+def test_a_fault_of_a_later_part_is_told_in_its_line(tmp_path, number, changes, words):
+    given = [{}, {}, {}]
+    given[number] = changes
+    if words is None:
+        assert ephemeris(tmp_path, parted(*given)).segments[number].points == 4
+    else:
+        start = f"{tmp_path / 'a.txt'}{'' if words.startswith(':') else ', '}{words}"
+        assert no_ephemeris(tmp_path, parted(*given)).startswith(start)
+
+
+LATE = [0, *range(15, 32)]  # the state vectors of a part without some of its first ones
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda p, v, t: (p, np.where(t == t[9], 2.5, 1.0) * v, t), "line 69: from 2026-03-20T12:36:00.000000 to "
+         "2026-03-20T12:37:00.000000 the velocities, 12.7201 km/s in the mean, are not those at which the positions "
+         "are passed, 7.26961 km/s; velocities are in km/s, in the frame of the positions"),
+        (lambda p, v, t: (np.where(t >= t[20], -1.0, 1.0) * p, v, t), "line 80: from 2026-03-20T12:47:00.000000 to "
+         "2026-03-20T12:48:00.000000 the positions are passed at 229.927 km/s, and a satellite of the Earth has at "
+         "most 10.7 there; find the position, or the time, that is wrong"),
+        (lambda p, v, t: (np.where(t == t[3], 0.5, 1.0) * p, v, t), "line 63: 3473.83 km from the Earth's centre, "
+         "where no satellite of the Earth is; positions are in km and velocities in km/s"),
+        (lambda p, v, t: (np.where(t == t[3], 300.0, 1.0) * p, v, t), "line 63: 2.0843e+06 km from the Earth's "
+         "centre, where no satellite of the Earth is; positions are in km and velocities in km/s"),
+        (lambda p, v, t: (p, v, np.where(t == t[7], t[6], t)), f"line 67: the epoch {stamp(2040)} does not come after "
+         f"{stamp(2040)} (line 66); sort the state vectors by time, each once"),
+        (lambda p, v, t: (p[:, LATE], v[:, LATE], t[LATE]), f"line 61: no state vector between {stamp(1680)} (line "
+         "60) and "
+         f"{stamp(2580)}, 900 s apart, where the usual step of the segment is 60 s; over such a hole the orbit is "
+         "not known: "
+         "split the segment into two there, or take a file without the hole"),
+    ],
+    ids=["velocity", "jump", "inside", "outside", "twice", "hole"],
+)  # fmt: skip
+def test_state_vectors_of_a_later_part_are_looked_at_as_well(tmp_path, change, words):
+    (first, rate, given), (second, other, _), _ = PARTS
+    position, velocity, time_s = change(*truth(second, other), second)
+    text = HEAD + segment(first, truth(first, rate), **given)
+    text += segment(time_s, States(position, velocity), USEABLE_START_TIME=stamp(1700), STOP_TIME=stamp(3540))
+    assert no_ephemeris(tmp_path, text) == f"{tmp_path / 'a.txt'}, {words}"
+
+
+@pytest.mark.parametrize(
+    ("degree", "t", "first", "count"),
+    [(4, 1300.0, 0, 5), (4, 1900.0, 1, 5), (5, 1300.0, 0, 6), (5, 1900.0, 1, 6), (5, 8990.0, 10, 6), (5, 10.0, 0, 6),
+     (6, 4790.0, 4, 7)],
+)  # fmt: skip
+def test_lagrange_is_the_polynomial_through_the_points_about_the_time(tmp_path, degree, t, first, count):
+    """Steps of ten minutes, so that another window gives another value; positions and velocities have one each."""
+    grid = np.arange(0.0, 9001.0, 600.0)
+    text = HEAD + segment(grid, INTERPOLATION="LAGRANGE", INTERPOLATION_DEGREE=str(degree))
+    found, known = ephemeris(tmp_path, text).states(t), truth(grid)
+    window = slice(first, first + count)
+    for of, nodes in zip(found, known, strict=True):
+        expected = BarycentricInterpolator(grid[window], nodes[:, window], axis=1)(t)
+        np.testing.assert_allclose(of, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "frame"),
+    [("itrf 2014", "ITRF2014"), ("Teme Of Date", "TEME"), ("j2000", "EME2000"), ("tod_earth", "TOD"), ("gcrf", "GCRF")],
+)
+def test_a_frame_is_known_by_its_other_names(given, frame):
+    assert oem.frame_name(given) == frame and oem.FRAMES.fullmatch(frame)
+
+
+@pytest.mark.parametrize(
+    "frame", ["ITRF20X", "XTEME", "TEMES", "TOD2000", "EME2000B", "MOD", "ITRF-", "ITRF--97", "GCRF3"]
+)
+def test_a_frame_of_a_name_that_goes_on_is_another(frame):
+    assert bool(oem.FRAMES.fullmatch(frame)) == (frame in ("ITRF-", "GCRF3"))
+
+
+# ------------------------------------------------------------------------------------------------ SGP4 in its own words
+@pytest.mark.parametrize(("day", "span", "words"), [
+    ("2026-04-02T12:00:00Z", (0.0, 3 * 86400.0), "the elements are expired: their epoch is 2026-03-20T12:00:00Z, the "
+     "mission's 2026-04-02T12:00:00Z, and 2026-04-05T12:00:00.000Z is 16.00 days from the elements; SGP4 is trusted "
+     "for 14 days: take newer elements, or set orbit.epoch near theirs"),
+    ("2026-03-01T06:00:00Z", (86400.0, 6 * 86400.0), "the elements are not valid yet: their epoch is "
+     "2026-03-20T12:00:00Z, the mission's 2026-03-01T06:00:00Z, and 2026-03-02T06:00:00.000Z is 18.25 days from the "
+     "elements; SGP4 is trusted for 14 days: take older elements, or set orbit.epoch near theirs"),
+    ("2026-03-21T00:00:00Z", (0.0, math.nan), "a time is not a finite number; give seconds since 2026-03-21T00:00:00Z"),
+])  # fmt: skip
+def test_elements_out_of_their_time_say_how_far(tmp_path, day, span, words):
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], Epoch(day))
+    for call in (lambda: orbit.require(*span), lambda: orbit.states(np.array(span))):
+        with pytest.raises(OrbitError) as caught:
+            call()
+        assert str(caught.value) == f"{tmp_path / 'a.txt'}, line 2 (EXAMPLE 1): {words}"
+
+
+def test_a_stop_and_a_low_perigee_say_when_and_what_to_do(tmp_path):
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], Epoch("2026-03-21T00:00:00Z"))
+    where = f"{tmp_path / 'a.txt'}, line 2 (EXAMPLE 1)"
+    object.__setattr__(orbit, "_satellite", Stopped(9))
+    with pytest.raises(OrbitError) as caught:
+        orbit.states(np.array([0.0, 61.0]))
+    assert str(caught.value) == (
+        f"{where}: SGP4 stops at 2026-03-21T00:01:01.000Z, 43261 s from the epoch of the elements: error 9; take newer "
+        "elements or an earlier epoch"
+    )
+    with pytest.raises(OrbitError) as caught:
+        Sgp4Orbit(replace(orbit.elements, mean_motion_rad_s=16.56 * REVOLUTION_A_DAY), orbit.epoch)
+    assert str(caught.value) == (
+        f"{where}: the perigee is 114 km high at 2026-03-20T12:00:00.000Z; below 120 km an orbit decays within about a "
+        "revolution: choose another satellite, or an epoch before its decay"
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "names"),
+    [("second", ["Second"]), ("0070020", ["Second", "Third"]), ("70020 ", ["Second", "Third"]), ("007", ["007"])],
+)
+def test_a_satellite_is_asked_for_by_name_or_number_whatever_stands_beside_it(tmp_path, asked, names):
+    chosen = [("EXAMPLE 1", 70001), ("Second", 70020), ("Third", 70020), ("007", 70003)]
+    text = "".join(f"{name}\n" + "\n".join(export_tle(invented(number))) + "\n" for name, number in chosen)
+    assert [e.name for e in elements(tmp_path, text, asked)] == names
+    with pytest.raises(OrbitError) as caught:
+        elements(tmp_path, text, "secnod")
+    assert str(caught.value) == (
+        f"{tmp_path / 'a.txt'}: none of its 4 element sets is of 'secnod'; nearest are Second, Third, EXAMPLE 1: "
+        "name one "
+        "of them, or a catalogue number"
+    )
+
+
+@pytest.mark.parametrize(("epoch", "day"), [("2026-03-14T18:00:00Z", 19.0), ("2026-03-14T17:59:00Z", 10.5)])
+def test_of_two_epochs_the_nearer_is_taken(tmp_path, epoch, day):
+    sets = tuple(elements(tmp_path, "\n".join(export_tle(invented(day=each))))[0] for each in (30.0, 19.0, 10.5))
+    chosen = closest_elements(sets, Epoch(epoch))
+    assert chosen is sets[(30.0, 19.0, 10.5).index(day)]
+
+
+# ------------------------------------------------------------------------------------------- several segments in XML
+def xml_of(*parts):
+    """An ephemeris in XML of several segments: that of each grid, with what its metadata change."""
+    bodies = [oem_xml(time_s, **given) for time_s, given in parts]
+    inner = [body[body.index("<segment>") : body.index("</body>")] for body in bodies]
+    return bodies[0][: bodies[0].index("<segment>")] + "\n".join(inner) + "</body></oem>"
+
+
+def test_segments_of_xml_are_each_read_with_their_own_metadata(tmp_path):
+    first, second = (
+        (GRID[:40], {"STOP_TIME": stamp(2000)}),
+        (GRID[30:], {"START_TIME": stamp(2000), "REF_FRAME": "GCRF"}),
+    )
+    found = ephemeris(tmp_path, xml_of(first, second))
+    assert [(s.start_s, s.stop_s, s.time_s.size) for s in found.segments] == [(0.0, 2000.0, 40), (2000.0, 6000.0, 71)]
+    plain = ephemeris(tmp_path, HEAD + "".join(segment(time_s, **given) for time_s, given in (first, second)))
+    for t in (3.0, 1999.0, 2001.0, 5999.0):
+        np.testing.assert_array_equal(found.states(t).position_m, plain.states(t).position_m)
+    only = xml_of((GRID, {}), (GRID, {"OBJECT_NAME": "B", "OBJECT_ID": "2026-9B"}))
+    for name in ("b", "2026-9b"):
+        assert ephemeris(tmp_path, only, name=name).name == "B"
+
+
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("Y_DOT", "Y_D0T", "line 107: Y_DOT is missing in this stateVector; add it"),
+    (
+        '<Z_DOT units="km/s">',
+        '<Z_DOT units="km">',
+        "line 107: Z_DOT is in 'km'; an OEM has it in 'km/s': convert the file",
+    ),
+    ('<Y units="km">', '<Y units="KM">', "line 107: Y is in 'KM'; an OEM has it in 'km': convert the file"),
+    (
+        "<EPOCH>2026-03",
+        "<EPOCH>2026-13",
+        "line 107: the epoch is '2026-13-20T13:41:40.000000', not a date and time; ",
+    ),
+    ("<X ", "<X>1</X><X ", "line 107: X is '"),
+    ("<stateVector>", "<stateVector><COMMENT>a</COMMENT><COMMENT>b</COMMENT>", ""),
+    ("<Z_DOT ", "<X_DDOT>1</X_DDOT><Z_DOT ", ""),
+])  # fmt: skip
+def test_a_fault_of_a_second_segment_of_xml_is_told_in_its_line(tmp_path, old, new, words):
+    text = xml_of((GRID, {}), (GRID + 6100.0, {}))
+    at = text.index(old, text.index("<stateVector>", text.rindex("<segment>")))
+    changed = text[:at] + text[at:].replace(old, new, 1 if old.startswith("<") else 2)
+    if not words:
+        assert ephemeris(tmp_path, changed).span_s == (0.0, 12100.0)
+    else:
+        assert no_ephemeris(tmp_path, changed).startswith(f"{tmp_path / 'a.txt'}, {words}")
+
+
+@pytest.mark.parametrize(("count", "listed"), [(2, 2), (8, 8), (9, 8)])
+def test_the_objects_of_an_ephemeris_are_listed_by_name_and_identifier(tmp_path, count, listed):
+    text = HEAD + "".join(segment(GRID[:5], OBJECT_NAME=f"SAT {k}", OBJECT_ID=f"ID-{k}") for k in range(count))
+    names = ", ".join(f"SAT {k} (ID-{k})" for k in range(listed))
+    for name, wanted in ((None, "no object is named"), ("SAT", "'SAT' names 0 of them")):
+        with pytest.raises(OrbitError) as refused:
+            ephemeris(tmp_path, text, name=name)
+        assert str(refused.value).startswith(f"{tmp_path / 'a.txt'}: it holds the objects {names}")
+        assert str(refused.value).endswith(f", and {wanted}; name one of them")
+    assert ephemeris(tmp_path, text, name="id-1").name == ephemeris(tmp_path, text, name="Sat 1").name == "SAT 1"
