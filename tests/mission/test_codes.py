@@ -322,7 +322,7 @@ def test_each_code_has_its_own_numbers(line):
     ("dvb-s2-2-3", ": Gaussian noise, no loss in synchronisation"),
     ("scppm-1-2", " dB from capacity, in one link, is taken for any order and background"),
 ])  # fmt: skip
-def test_a_code_says_what_its_threshold_holds_for(name, ends):
+def test_a_code_says_at_its_end_what_its_threshold_holds_for(name, ends):
     code = codes()[name]
     assert code.regime.startswith(f"{code.title}: ") and code.regime.endswith(ends)
 
