@@ -1,12 +1,14 @@
 """Results of the library as data sets of xarray: named, with units, and whole behind a file."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import xarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 import microrad
-from microrad.core.labelled import TEXT, variables
+from microrad.core.labelled import TEXT, Group, variables
 from microrad.loop.pointing_loop.ensemble import COUNTERS, bin_edges_rad
 
 PLAYS = microrad.PrandtlIshlinskii((0.0, 1.0), (30e-6, 6e-6))
@@ -88,3 +90,20 @@ def test_what_is_not_there_is_no_number():
     assert found["limit"].values.dtype == float
     assert_array_equal(found["limit"].values, [2e-6, np.nan])
     assert [*found["name"].values] == ["a", None]
+
+
+def test_a_group_has_its_coordinates_attributes_and_values_picked_from_records():
+    places = [
+        SimpleNamespace(at=SimpleNamespace(x=2.5), name="a"),
+        SimpleNamespace(at=SimpleNamespace(x=None), name="b"),
+    ]
+    found = variables("place", places, x=("m", "where", "at.x"), twice=("m^2", "area", lambda p: 2 * len(p.name)))
+    names = variables("place", places, place=(TEXT, "its name", "name"))
+    flat = variables("place of", grid=("V", "a grid", np.arange(6).reshape(2, 3)))
+    made = Group({**found, **flat}, names, {"by": "hand", "count": 3}).to_xarray()
+    assert made.attrs == {"by": "hand", "count": 3}
+    assert made.place.values.tolist() == ["a", "b"] and made.place.attrs == {"units": "1", "long_name": "its name"}
+    assert_array_equal(made.x, [2.5, np.nan])
+    assert made.twice.attrs == {"units": "m^2", "long_name": "area"} and made.twice.values.tolist() == [2, 2]
+    assert made.grid.dims == ("place", "of") and dict(made.sizes) == {"place": 2, "of": 3}
+    assert [*made.coords] == ["place"]

@@ -260,3 +260,42 @@ def test_nothing_is_taken_for_left_behind_where_no_process_can_be_asked_for(tmp_
     (tmp_path / "folder").mkdir()
     monkeypatch.setattr(folder.os, "name", "nt")
     assert not folder._left_behind(tmp_path / "folder", gone.pid)
+
+
+OTHERS = "holds files that are not a day of microrad: choose another --output"
+OF_A_DAY = {"manifest.json": '{"versions": {"microrad": "1"}, "day": 1}'}
+OF_ANOTHER = {"manifest.json": '{"versions": {"numpy": "1"}, "day": 1}'}
+THERE = "already holds a day: choose another --output, or replace them with --overwrite"
+
+
+@pytest.mark.parametrize(
+    ("holds", "overwrite", "said"),
+    [
+        (None, False, None), ({}, False, None), ({"x": "1"}, True, OTHERS), (OF_A_DAY, True, None),
+        (OF_A_DAY, False, THERE), (OF_ANOTHER, True, OTHERS), ({"manifest.json": "[1]"}, True, OTHERS),
+        ("a file", True, "is a file, not a folder: choose another --output"),
+    ],
+)  # fmt: skip
+def test_a_folder_is_replaced_where_it_is_none_or_empty_or_holds_what_it_is_to_hold(tmp_path, holds, overwrite, said):
+    place = tmp_path / "day"
+    if isinstance(holds, str):
+        place.write_text(holds, "utf-8")
+    elif holds is not None:
+        place.mkdir()
+        for name, text in holds.items():
+            (place / name).write_text(text, "utf-8")
+    if said is None:
+        folder.check_folder(place, overwrite, "day", "a day")
+        return
+    with pytest.raises(folder.FolderError) as refused:
+        folder.check_folder(place, overwrite, "day", "a day")
+    assert str(refused.value) == f"{place} {said}"
+
+
+def test_an_error_of_a_file_elsewhere_names_that_file_and_one_of_the_draft_its_place(tmp_path):
+    draft, place = tmp_path / "draft", tmp_path / "place"
+    for at, named in ((tmp_path / "draft2" / "x", tmp_path / "draft2" / "x"), (draft / "a" / "b", place / "a" / "b"),
+                      (draft, place), (os.fsencode(draft / "c"), place / "c")):  # fmt: skip
+        with pytest.raises(OSError) as caught, folder.naming(draft, place):
+            raise OSError(errno.ENOSPC, "full", at if isinstance(at, bytes) else str(at))
+        assert (caught.value.errno, caught.value.strerror, caught.value.filename) == (errno.ENOSPC, "full", str(named))

@@ -8,10 +8,11 @@ import control
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.linalg import block_diag, solve_discrete_lyapunov
+from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_lyapunov
 from scipy.signal import cont2discrete, dlsim, lsim
 
 from microrad.core import lti
+from microrad.core.kernels import doubling
 
 NUMERATOR = (1.979e11, 7.051e13, 2.973e13)  # Eq. 2 of the paper, powers of s in rad/s
 DENOMINATOR = (1.0, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14)
@@ -469,3 +470,158 @@ FROM_ROOTS = lti.modal_from_roots(np.array([-4.0 + 7.0j, -4.0 - 7.0j]), np.array
 ])  # fmt: skip
 def test_systems_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+# ------------------------------------------------------------------------------------- orders, signs and shapes unlike
+def test_modes_stand_by_the_size_of_their_poles_whatever_their_order_and_pairs_by_the_upper_one():
+    poles = np.array([-2.0, -3.0 - 40.0j, -700.0, -9.0 + 5.0j, -3.0 + 40.0j, -9.0 - 5.0j], dtype=complex)
+    residues = np.array([1.5, 2.0 - 7.0j, -4.0, 0.3 + 0.8j, 2.0 + 7.0j, 0.3 - 0.8j])
+    found = lti.modal_from_residues(poles, residues)
+    expected = block_diag(-700.0, [[-3.0, 40.0], [-40.0, -3.0]], [[-9.0, 5.0], [-5.0, -9.0]], -2.0)
+    assert_allclose(found.A, expected)
+    assert_allclose(found.B[:, 0], [1, 1, 0, 1, 0, 1])
+    assert_allclose(found.C[0], [-4.0, 4.0, 14.0, 0.6, 1.6, 1.5])
+    s = 2j * pi * np.array([0.2, 6.0])
+    assert_allclose(lti.frequency_response(found, s.imag / 2 / pi)[:, 0, 0], np.sum(residues / (s[:, None] - poles), 1))
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator"),
+    [((-3.0, 5.0), (-2.0, -8.0, -30.0)), ((4.0,), (1.0, 5.0, 6.0, 0.0)), ((0.0, 7.0, 0.0), (3.0, 4.0, 9.0))],
+    ids=["signs", "integrator", "zero at rest"],
+)
+def test_a_modal_form_is_its_polynomials(numerator, denominator):
+    freq, system = np.array([0.05, 0.6, 4.0]), lti.modal_from_polynomials(numerator, denominator)
+    s = 2j * pi * freq
+    assert_allclose(
+        lti.frequency_response(system, freq)[:, 0, 0], np.polyval(numerator, s) / np.polyval(denominator, s)
+    )
+
+
+@pytest.mark.parametrize(("zero", "at_hz"), [(6.0, 0.1), (-6.0, 0.1), (-0.5, 3.0), (0.5, 3.0)])
+def test_a_form_from_roots_is_turned_to_where_its_real_part_is_positive_at_its_frequency(zero, at_hz):
+    poles = np.array([-1.0, -4.0 + 9.0j, -4.0 - 9.0j])
+    system = lti.modal_from_roots(np.array([zero], dtype=complex), poles, at_hz)
+    s, at = 2j * pi * np.array([0.3, 2.2]), 2j * pi * at_hz
+    plain, there = ((x - zero) / np.prod(x - poles) for x in (s[:, None], at))
+    plain = (s - zero) / np.prod(s[:, None] - poles, axis=1)
+    expected = plain * np.copysign(1.0, there.real) / abs(there)
+    assert_allclose(lti.frequency_response(system, s.imag / 2 / pi)[:, 0, 0], expected, rtol=1e-10)
+
+
+def test_a_hold_of_a_stack_of_systems_with_more_inputs_than_states_is_that_of_each():
+    rng = np.random.default_rng(2)
+    A, B = rng.standard_normal((3, 2, 2)) - 2 * np.eye(2), rng.standard_normal((3, 2, 5))
+    found = lti.first_order_hold(A, B, 0.3)
+    assert [each.shape for each in found] == [(3, 2, 2), (3, 2, 5), (3, 2, 5)]
+    for i in range(3):
+        Ad, inverse = expm(A[i] * 0.3), np.linalg.inv(A[i])
+        held = inverse @ (Ad - np.eye(2)) @ B[i]
+        ramp = inverse @ (held / 0.3 - B[i])
+        for got, expected in zip((each[i] for each in found), (Ad, held - ramp, ramp), strict=True):
+            assert_allclose(got, expected, rtol=1e-11, atol=1e-12)
+
+
+def test_a_response_at_one_frequency_of_more_outputs_than_inputs_has_its_direct_path():
+    one = lti.StateSpace(np.array([[0.5]]), np.array([[2.0, -1.0]]), np.array([[1.0], [3.0], [7.0]]), np.ones((3, 2)))
+    z = np.exp(2j * pi * 40.0 * 2e-3)
+    for step, point in ((2e-3, z), (None, 2j * pi * 40.0)):
+        found = lti.frequency_response(one, np.float64(40.0), step)
+        assert found.shape == (1, 3, 2)
+        assert_allclose(found[0], one.C @ one.B / (point - 0.5) + 1.0, rtol=1e-13)
+
+
+@pytest.mark.parametrize(("elements", "cases"), [(0, 1), (1, 2), (3, 8), (6, 64), (7, 2), (9, 2)])
+def test_all_combinations_of_up_to_six_elements_slide_and_beyond_all_or_none(elements, cases):
+    found = lti.sliding_cases(elements)
+    assert found.shape == (cases, elements)
+    if elements <= 6:
+        assert_allclose(found @ 2.0 ** np.arange(elements)[::-1], np.arange(cases))
+    else:
+        assert found.tolist() == [[0.0] * elements, [1.0] * elements]
+
+
+def test_growth_is_that_of_the_worst_combination_which_may_be_one_element_alone():
+    A, E, F = np.diag([-1.0, -2.0]), np.array([[1.0, 0.0], [0.0, 1.0]]), np.array([[1.0, 0.0], [0.0, 1.0]])
+    found = [lti.growth_1_s(A, E, F, np.array(gains)) for gains in ([3.0, -9.0], [-9.0, 7.0], [-1.0, -1.0])]
+    assert_allclose(found, [2.0, 5.0, -1.0])
+
+
+def test_a_reduced_system_keeps_its_slow_gain_and_stays_within_its_bound_with_two_inputs_and_three_outputs():
+    poles = np.array([0.95, 0.6, -0.3, 0.1, 0.05])
+    rng = np.random.default_rng(7)
+    B, C, D = rng.standard_normal((5, 2)), rng.standard_normal((3, 5)), rng.standard_normal((3, 2))
+    system, freq = lti.StateSpace(np.diag(poles), B, C, D), np.linspace(0.0, 0.5, 200)
+    P, Q = solve_discrete_lyapunov(system.A, B @ B.T), solve_discrete_lyapunov(system.A.T, C.T @ C)
+    hankel = np.sort(np.sqrt(np.linalg.eigvals(P @ Q).real))[::-1]
+    for error in (1e-9, 0.3, 3.0, 12.0, 1e4):
+        small = lti.reduced(system, error)
+        off = lti.frequency_response(small, freq, 1.0) - lti.frequency_response(system, freq, 1.0)
+        assert_allclose(off[0], 0.0, atol=1e-9 * np.max(np.abs(C)))
+        assert np.max(np.linalg.norm(off, 2, axis=(1, 2))) <= error + 1e-9
+        assert small.order == next(n for n in range(6) if 2.0 * np.sum(hankel[n:]) <= error)
+
+
+@pytest.mark.parametrize(
+    ("value", "bits", "rounded"),
+    [
+        (-0.7, 3, -0.75), (5.3, 4, 5.5), (0.0, 5, 0.0), (1023.9, 2, 1024.0), (-3e-9, 1, -(2.0**-28)),
+        (2.0**-1060, 8, 2.0**-1060),
+    ],
+)  # fmt: skip
+def test_a_number_is_rounded_to_bits_about_its_own_size(value, bits, rounded):
+    assert lti.to_bits(np.array([[value]]), bits).tolist() == [[rounded]]
+    matrices = [np.full((2, 2), value), np.full((2, 1), -value), np.full((1, 2), 3 * value), np.full((1, 1), value)]
+    found = lti.system_to_bits(lti.StateSpace(*matrices), bits)
+    for key, matrix in zip("ABCD", matrices, strict=True):
+        assert_allclose(getattr(found, key), lti.to_bits(matrix, bits), rtol=0.0)
+
+
+def test_a_slow_state_loses_as_much_in_a_step_as_before_down_to_a_part_in_2_to_the_44():
+    lost = np.array([3e-9, 0.3, 1.7, 2.0**-46, 2.0**-44])
+    found = 1.0 - lti.decay_to_bits(1.0 - lost, 20)
+    assert_allclose(found[:3], lost[:3], rtol=2e-5)
+    assert found[3:].tolist() == [0.0, 2.0**-44] and found[1] != lost[1]
+
+
+@pytest.mark.parametrize(
+    ("diagonal", "order"), [([3.0, 1.0, 2.0, 1.0 + 1e-11], [1, 3, 2, 0]), ([5.0, 5.0 - 1e-11, 0.0], [2, 0, 1])]
+)
+def test_axes_of_uncorrelated_states_are_the_states_and_those_of_one_size_in_their_order(diagonal, order):
+    matrix = np.diag(diagonal)
+    matrix[0, 1] = matrix[1, 0] = 1e-10
+    found, axes = lti.principal_axes(matrix)
+    assert_allclose(found, np.array(diagonal)[order], rtol=0.0)
+    assert_allclose(axes, np.eye(len(order))[:, order], rtol=0.0)
+
+
+def test_the_root_of_a_covariance_keeps_the_states_behind_one_that_adds_nothing():
+    root = np.array([[2.0, 0, 0, 0], [1.0, 0, 0, 0], [-3.0, 0, 4.0, 0], [0.5, 0, -1.0, 7.0]])
+    size = np.array([1.0, 1e5, 1e-8, 3.0])[:, None]
+    assert_allclose(lti.covariance_root((size * root) @ (size * root).T), size * root, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_doubling_ends_at_the_solutions_that_scipy_finds_with_pivots_of_any_order(seed):
+    rng = np.random.default_rng(seed)
+    A, B, Q = rng.standard_normal((4, 4)), rng.standard_normal((4, 2)), np.diag([1.0, 0.0, 3.0, 0.2])
+    weight = np.diag([0.3, 2.0])
+    expected, X = solve_discrete_are(A, B, Q, weight), Q.copy()
+    G = B @ np.linalg.inv(weight) @ B.T
+    assert doubling.riccati_kernel.py_func(A.copy(), G, X, np.empty((4, 4, 4)), np.empty((4, 8)))
+    assert_allclose(X, expected, rtol=1e-8, atol=1e-9 * np.max(expected))
+    stable, X = 0.9 * A / np.max(np.abs(np.linalg.eigvals(A))), Q + 0.1
+    doubling.gramian_kernel.py_func(stable.copy(), X, np.empty((3, 4, 4)))
+    assert_allclose(X, solve_discrete_lyapunov(stable.T, Q + 0.1), rtol=1e-9, atol=1e-9)
+    matrix, right = rng.standard_normal((5, 5)), rng.standard_normal((5, 3))
+    matrix[0, 0] = matrix[2, 1] = matrix[3, 3] = 0.0
+    wanted = np.linalg.solve(matrix, right)
+    doubling._eliminate.py_func(matrix, right)
+    assert_allclose(right, wanted, rtol=1e-9)
+
+
+def test_a_plant_that_no_input_holds_has_no_solution_of_its_riccati_equation():
+    work = np.empty((4, 2, 2)), np.empty((2, 4))
+    lone, G = np.diag([0.5, 1.25]), np.diag([1.0, 0.0])
+    assert not doubling.riccati_kernel.py_func(lone.copy(), G.copy(), np.eye(2), *work)
+    assert doubling.riccati_kernel.py_func(lone[::-1, ::-1] / 2, G.copy(), np.eye(2), *work)

@@ -430,3 +430,104 @@ def test_random_damage_is_refused_or_read_and_nothing_else(saved, tmp_path):
     tracemalloc.stop()
     assert min(seen.values()) > 0 and len(reasons) > 2
     assert peak < 3_000_000
+
+
+# ---------------------------------------------------------------------------------------- kinds, places and encodings
+KINDS = {
+    1: ("cells", "save the numbers of each cell as an array"), 4: ("text", "save numbers"),
+    3: ("an object of MATLAB", "only MATLAB reads it: save its numbers as arrays"), 16: ("a function", "save numbers"),
+    5: ("a sparse matrix", "save it as full"), 18: ("data of a kind that is not known", "save numbers"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_what_is_not_read_says_its_kind_and_remedy_and_what_stands_behind_it_is_read(tmp_path, kind, order):
+    behind = matrix(order, 6, (1, 2), b"x", doubles(order, [3.0, -4.5]))
+    path = write(tmp_path / "a.mat", order, matrix(order, kind, (2, 2), b"odd", bytes(64)), behind)
+    found = MatlabFile(path, MOST_BYTES).variables
+    assert [*found] == ["odd", "x"] and found["x"].tolist() == [[3.0, -4.5]]
+    assert (found["odd"].kind, found["odd"].remedy) == KINDS[kind]
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize(("kind", "bits"), [(1, 8), (2, 8), (4, 16), (16, 8), (17, 16), (18, 32)])
+def test_text_is_read_in_each_encoding_and_order_and_several_lines_are_not(tmp_path, order, kind, bits):
+    text, ends = "µ鏡 b", "-le" if order == "<" else "-be"
+    data = text.encode(f"utf-{bits}" + ends * (bits > 8))
+    one, several = (
+        matrix(order, 4, (rows, 4), name, element(order, kind, data)) for rows, name in ((1, b"t"), (2, b"u"))
+    )
+    found = MatlabFile(write(tmp_path / "a.mat", order, one, several), MOST_BYTES, whole=True).variables
+    assert found["t"] == text
+    assert (found["u"].kind, found["u"].remedy) == ("text of several lines", "save it as cells of one line each")
+
+
+NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("flags", [0, 8, 2, 10], ids=["plain", "complex", "logical", "both"])
+def test_numbers_of_each_type_are_floats_in_columns_complex_before_logical(tmp_path, order, flags):
+    real, imaginary = np.array([7, 0, 2, 0, 5, 9]), np.array([1, 3, 0, 0, 8, 4])
+    parts = {
+        k: [element(order, k, x.astype(order + code).tobytes()) for x in (real, imaginary)]
+        for k, code in NUMBERS.items()
+    }
+    made = [
+        matrix(order, 8, (2, 3), f"v{k}".encode(), *both[: 1 + flags // 8], flags=flags) for k, both in parts.items()
+    ]
+    found = MatlabFile(write(tmp_path / "a.mat", order, *made), MOST_BYTES).variables
+    values = real + 1j * imaginary if flags & 8 else real != 0 if flags else real
+    assert [*found] == [f"v{kind}" for kind in NUMBERS]
+    for each in found.values():
+        assert each.dtype == (complex if flags & 8 else bool if flags else float)
+        np.testing.assert_array_equal(each, values.reshape(3, 2).T)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_damage_of_the_second_variable_says_at_which_byte_it_begins(tmp_path, packed):
+    first = matrix("<", 6, (2, 2), b"x", doubles("<", range(4)))
+    bad = matrix("<", 6, (3, 1), b"y", doubles("<", range(2)))
+    path = write(tmp_path / "a.mat", "<", first, bad, compressed=packed)
+    at = 128 + (8 + len(zlib.compress(first)) if packed else len(first))
+    assert refused(path) == (f"the variable at byte {at}: 16 bytes where 3 numbers of 8 bytes are said to be", "")
+
+
+@pytest.mark.parametrize(
+    ("data", "words", "remedy"),
+    [
+        (b"\0abc", "it is of version 4 or none of MATLAB", "load it in MATLAB and save it with -v7"),
+        (b"abc\0", "it is of version 4 or none of MATLAB", "load it in MATLAB and save it with -v7"),
+        (b"abcd\0", "it has no header of version 5", ""), (b"", "it has no header of version 5", ""),
+    ],
+)  # fmt: skip
+def test_a_file_of_another_version_is_told_by_its_first_four_bytes(tmp_path, data, words, remedy):
+    (tmp_path / "a.mat").write_bytes(data + b"x" * (200 if data else 0))
+    assert refused(tmp_path / "a.mat") == (words, remedy)
+
+
+def test_names_that_stand_three_times_count_on_and_a_structure_of_none_or_two_has_its_names_alone(tmp_path):
+    def structure(size, name):
+        names = element("<", 5, struct.pack("<i", 8)) + element("<", 1, b"first\0\0\0second\0\0")
+        fields = [matrix("<", 6, (1, 1), b"", doubles("<", [value])) for value in range(2 * size)]
+        return matrix("<", 2, (1, size), name, names, *fields)
+
+    same = [matrix("<", 6, (1, 1), b"y\0junk", doubles("<", [value])) for value in (1.0, 2.0, 3.0)]
+    path = write(tmp_path / "a.mat", "<", *same, *(structure(n, f"s{n}".encode()) for n in (0, 1, 2)))
+    found = MatlabFile(path, MOST_BYTES).variables
+    assert [float(found[name].item()) for name in ("y", "_1_y", "_2_y")] == [1.0, 2.0, 3.0]
+    assert found["s0"].fields == found["s2"].fields == {"first": None, "second": None}
+    assert {name: each.item() for name, each in found["s1"].fields.items()} == {"first": 0.0, "second": 1.0}
+    assert [[each.item() for each in one.values()] for one in found["s2"].elements] == [[0.0, 1.0], [2.0, 3.0]]
+
+
+def test_numbers_left_of_a_second_variable_are_read_from_their_own_place_and_its_damage_named(tmp_path):
+    made = [matrix("<", 6, (20, 2), name, doubles("<", np.arange(40.0) + k)) for k, name in ((100, b"a"), (700, b"b"))]
+    file = MatlabFile(write(tmp_path / "a.mat", "<", *made), MOST_BYTES)
+    b = file.variables["b"]
+    assert (b.shape, b.variable) == ((20, 2), 128 + len(made[0]))
+    np.testing.assert_array_equal(file.numbers(b), (np.arange(40.0) + 700).reshape(2, 20).T)
+    (tmp_path / "a.mat").write_bytes((tmp_path / "a.mat").read_bytes()[:-11])
+    with pytest.raises(MatlabFileError, match=f"^the variable at byte {b.variable}: an element is cut off, 11 b"):
+        file.numbers(b)

@@ -144,3 +144,31 @@ def test_a_machine_is_named_by_its_c_library_or_else_by_its_system(monkeypatch, 
     monkeypatch.setattr(machine.platform, "libc_ver", lambda: found)
     monkeypatch.setattr(machine.platform, "platform", lambda terse: "Some-System-1" if terse else "long")
     assert machine.machine()["C library"] == told
+
+
+@pytest.mark.parametrize(
+    ("stated", "found"),
+    [({"architecture": "a", "processor": "p"}, {"architecture": "a", "processor": "p"}), ("x86_64", {"architecture":
+     "x86_64"}), ("", {}), (None, {}), ({}, {}), (7, {"architecture": "7"})],
+)  # fmt: skip
+def test_a_machine_of_an_older_manifest_is_its_architecture(stated, found):
+    assert machine.as_stated(stated) == found
+
+
+def test_variables_that_are_set_stand_behind_what_each_machine_has_in_their_order(monkeypatch):
+    for name in machine.VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    monkeypatch.setenv("NUMBA_OPT", "")
+    monkeypatch.setenv("OMP_NUM_THREADS_OF_ANOTHER", "5")
+    found = machine.machine()
+    assert list(found.items())[6:] == [("NUMBA_OPT", ""), ("OMP_NUM_THREADS", "3")]
+    assert list(found)[:6] == [
+        "architecture",
+        "processor",
+        "instruction sets",
+        "C library",
+        "numpy's BLAS",
+        "scipy's BLAS",
+    ]
+    assert list(machine.versions()) == ["python", *machine.LIBRARIES]

@@ -370,3 +370,37 @@ NONE_OF = 'no interpretation "spatial"; give one of temporal, mixed'
 def test_a_refusal_of_an_error_says_which_and_what_to_give(call, words):
     with pytest.raises(ValueError, match="^" + re.escape(words)):
         call()
+
+
+@pytest.mark.parametrize(
+    ("terms", "found"),
+    [
+        ([("a", 30.5, "dBW"), ("b", -2.25, "dB"), ("c", 7.0, "dB")], 35.25),
+        ([("b", -2.25, "dB"), ("a", -41.0, "dBm")], -43.25), ([], 0.0),
+        ([("one", 3.0, "dBm"), ("b", 1.0, "dB"), ("two", 4.0, "dBW"), ("three", 5.0, "dBm")],
+         "one, two, three: only one line of a sum in decibels may be a power level"),
+        ([("a", 3.0, "dB"), ("rate", 4.0, "Hz"), ("b", 5.0, "W")],
+         '"rate" is in Hz: only lines in dB, dBm or dBW add up in decibels'),
+    ],
+)  # fmt: skip
+def test_decibels_add_up_to_one_level_at_most(terms, found):
+    lines = (Line(name, value, unit, "", "", "") for name, value, unit in terms)
+    if isinstance(found, float):
+        assert total_db(lines) == found
+        return
+    with pytest.raises(ValueError) as refused:
+        total_db(lines)
+    assert str(refused.value) == found
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [(("rad", "m", "rad"), "m, rad"), (("dB",), "dB"), (("dBm", "dBm"), "dBm"), (("dBW",), "dBW"), ((), "none")],
+)
+def test_a_root_sum_square_takes_one_linear_unit_and_names_those_that_it_got(units, said):
+    with pytest.raises(ValueError) as refused:
+        root_sum_square(Line("x", 1.0, unit, "", "", "") for unit in units)
+    assert str(refused.value) == f"a root sum square needs lines in one linear unit, these are in {said}"
+    assert root_sum_square(Line("x", value, "A", "", "", "") for value in (2.0, -3.0, 6.0)) == pytest.approx(
+        7.0, rel=1e-12
+    )

@@ -2,7 +2,8 @@
 
 import re
 from dataclasses import replace
-from math import cos, inf, isnan, pi, sqrt
+from math import cos, expm1, inf, isnan, pi, sqrt
+from types import SimpleNamespace
 
 import control as python_control
 import numpy as np
@@ -17,7 +18,7 @@ from microrad.loop import sine_run as simulate
 from microrad.loop.control import Drive, Gains, Inverse, Timing
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from places import ROOT
 
@@ -415,3 +416,64 @@ def test_a_direct_path_that_no_double_can_divide_by_is_none():
     assert np.array_equal(control.anti_windup(one), [[0.0]])
     there = lti.StateSpace(one.A, one.B, one.C, np.array([[1e-20]]))
     assert control.anti_windup(there) == pytest.approx(1e16, rel=1e-12)
+
+
+# ---------------------------------------------------------------------- recursions of numbers unlike each other
+@pytest.mark.parametrize(
+    "gains", [(3e3, 4e6, 2.5, 3e-4), (3e3, 0, 2.5, 0), (0, 4e6, 0, 1e-3), (-7.0, -4.0, -2.0, 0.1), (5.0, 0, 0, 0.2)]
+)
+def test_a_pid_is_its_difference_equations_with_a_state_for_each_part_that_is_there(gains):
+    p, i, d, tau = gains
+    period, errors = 1.6e-3, np.random.default_rng(2).standard_normal(30)
+    s = control.pid(control.Gains(*gains), period)
+    assert s.order == (i != 0.0) + (d != 0.0)
+    x, total, slope, before = np.zeros(s.order), 0.0, 0.0, 0.0
+    for e in errors:
+        total, slope, before = total + i * period * e, (tau * slope + d * (e - before)) / (tau + period), e
+        assert (s.C @ x + s.D[:, 0] * e).item() == pytest.approx(p * e + total + slope, rel=1e-9)
+        x = s.A @ x + s.B[:, 0] * e
+
+
+@pytest.mark.parametrize(("steps", "delay"), [(1, 0), (1, 3), (4, 0), (4, 3), (4, 4), (4, 11)])
+@pytest.mark.parametrize("bandwidth_hz", [700.0, inf])
+def test_a_sampled_path_is_the_plant_step_by_step_behind_delay_and_amplifier(steps, delay, bandwidth_hz):
+    """A mirror with a direct term and two outputs, advanced by hand; more delay than a sample, too."""
+    linear = lti.StateSpace(
+        np.array([[-300.0, 900.0], [-900.0, -200.0]]), np.array([[70.0], [-40.0]]), np.array([[1.0, 0.3], [0.2, 2.0]]),
+        np.array([[0.01], [0.4]]),
+    )  # fmt: skip
+    timing = control.Timing(8e-4, steps, delay)
+    found = control.sampled_path(linear, control.Drive(-1.0, 1.0, bandwidth_hz, 1e9, 0.0, 0.0), timing)
+    Ad, B0, B1 = lti.first_order_hold(linear.A, linear.B, 8e-4 / steps)
+    follow = -expm1(-2 * pi * bandwidth_hz * 8e-4 / steps)
+    x, drive, waiting, z = np.zeros(2), 0.0, [0.0] * delay, np.zeros(found.order)
+    for command in np.random.default_rng(1).standard_normal(12):
+        assert_allclose(found.C @ z, linear.C @ x + linear.D[:, 0] * drive, rtol=1e-9, atol=1e-12)
+        z = found.A @ z + found.B[:, 0] * command
+        for _ in range(steps):
+            waiting.append(command)
+            then = drive + follow * (waiting.pop(0) - drive)
+            x, drive = Ad @ x + B0[:, 0] * drive + B1[:, 0] * then, then
+    assert found.order == 3 + delay and not found.D.any()
+
+
+def test_an_inverse_of_several_actuators_keeps_which_element_belongs_to_which():
+    models = (
+        PrandtlIshlinskii((0.0, 1.0, 3.0), (40e-6, 6e-6, 4e-6)), PrandtlIshlinskii((0.0, 2.5), (30e-6, 9e-6)),
+    )  # fmt: skip
+    creep = (Creep((1e-6, 2e-6), (0.5, 8.0)), Creep((3e-6,), (2.0,)))
+    made = SimpleNamespace(actuators=2, inverse=models, inverse_creep=creep)
+    found = control.inverse(made)
+    own = [model.inverted() for model in models]
+    assert found.direct == tuple(each.weights_rad_v[0] for each in own)
+    assert found.play_thresholds == (*own[0].thresholds_v[1:], *own[1].thresholds_v[1:])
+    assert found.play_weights == (*own[0].weights_rad_v[1:], *own[1].weights_rad_v[1:])
+    assert (found.play_actuator, found.bouc_wen, found.creep) == ((0, 0, 1), (), creep)
+    arrays = control.inverse_arrays(found, 0.2)
+    assert_allclose(arrays["inverse_lag_keep"], np.exp([-0.4, -0.025, -0.1]), rtol=1e-12)
+    assert_allclose(arrays["inverse_lag_weight"], [1e-6, 2e-6, 3e-6])
+    assert [arrays[f"inverse_{of}_actuator"].tolist() for of in ("lag", "play")] == [[0, 0, 1]] * 2
+    assert_allclose(arrays["inverse_play_weight"], found.play_weights)
+    assert_allclose(arrays["inverse_widening"], found.widening)
+    plain = control.inverse_arrays(control.Inverse((1.0, 2.0, 3.0)), 0.2)
+    assert_allclose(plain["inverse_widening"], [[0, inf]] * 3)

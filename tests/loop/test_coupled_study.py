@@ -571,3 +571,66 @@ def test_least_singular_values_have_all_their_digits_where_both_are_alike(apart)
     left, right = np.linalg.qr(drawn)[0]
     matrices = 0.6 * left @ np.diag([1.0, 1.0 - apart]) @ right
     assert_allclose(np.sqrt(whole.least_squares(matrices)), 0.6 * (1.0 - apart), rtol=1e-15 / (1.0 - apart) + 4e-15)
+
+
+@pytest.mark.parametrize("shape", [(7, 2, 2), (1, 2, 2)])
+def test_closed_forms_of_two_rows_are_those_of_any_number(shape):
+    rng = np.random.default_rng(8)
+    M = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    assert_allclose(whole._inverse(M), np.linalg.inv(M), rtol=1e-11)
+    assert_allclose(whole._determinant(M), np.linalg.det(M), rtol=1e-11)
+    assert_allclose(whole.least_squares(M), np.linalg.svd(M)[1][:, -1] ** 2, rtol=1e-9)
+    assert_allclose(whole.least_squares(M * 0.0 + np.array([[2j, 0], [0, 0]])), 0.0, atol=0.0)
+
+
+def whole_of_two():
+    """Five states, two commands, three white sequences and the noise of two sensors, every number another one."""
+    rng = np.random.default_rng(9)
+    D = np.zeros((4, 7))
+    D[2, 5], D[3, 6] = 0.3, 0.7
+    s = lti.StateSpace(rng.standard_normal((5, 5)), rng.standard_normal((5, 7)), rng.standard_normal((4, 5)), D)
+    return control.WholePlant(2e-4, s, 2, 3, 1.3e-4)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_an_axis_alone_has_its_own_command_errors_and_noise_and_the_others_noise_as_disturbance(axis):
+    plant = whole_of_two()
+    found, s = whole.alone(plant, axis), plant.system
+    order = [axis, 2, 3, 4, 6 - axis, 5 + axis]
+    assert_allclose(found.system.A, s.A)
+    assert_allclose(found.system.B, np.column_stack([s.B[:, order], np.zeros(5)]))
+    assert_allclose(found.system.C, np.vstack([s.C[[axis, 2 + axis]], np.zeros(5)]))
+    assert_allclose(found.system.D[1], [0, 0, 0, 0, 0, (0.3, 0.7)[axis], 0])
+    assert not found.system.D[[0, 2]].any()
+    told = found.period_s, found.disturbances, found.gain_rad_v, found.has_optical, found.has_gauge
+    assert told == (2e-4, 4, 1.3e-4, True, False)
+
+
+def test_controllers_side_by_side_are_one_of_blocks_without_their_gauges():
+    rng, each = np.random.default_rng(4), []
+    for n in (1, 3):
+        shapes = (n, n), (n, 2), (1, n), (1, 2)
+        system = lti.StateSpace(*(rng.standard_normal(shape) for shape in shapes))
+        each.append(control.AxisController(f"c{n}", system, rng.standard_normal((n, 1))))
+    found = whole.side_by_side("both", each)
+    a, b = (one.system for one in each)
+    assert_allclose(found.system.A, block_diag(a.A, b.A))
+    assert_allclose(found.system.B, block_diag(a.B[:, :1], b.B[:, :1]))
+    assert_allclose(found.system.C, block_diag(a.C, b.C))
+    assert_allclose(found.system.D, block_diag(a.D[:, :1], b.D[:, :1]))
+    assert_allclose(found.anti_windup, block_diag(each[0].anti_windup, each[1].anti_windup))
+    assert found.name == "both"
+
+
+def test_a_loop_of_all_axes_closes_with_plant_before_controller():
+    plant = whole_of_two()
+    rng = np.random.default_rng(5)
+    c = lti.StateSpace(*(rng.standard_normal(shape) for shape in ((3, 3), (3, 2), (2, 3), (2, 2))))
+    x, z = rng.standard_normal(5), rng.standard_normal(3)
+    seen = plant.system.C[2:] @ x
+    expected = [*(plant.system.A @ x + plant.system.B[:, :2] @ (c.C @ z + c.D @ seen)), *(c.A @ z + c.B @ seen)]
+    assert_allclose(whole.closed_map(plant, c) @ [*x, *z], expected, rtol=1e-11)
+    point = np.exp(2j * np.pi * 130.0 * 2e-4)
+    G = plant.system.C[2:] @ np.linalg.inv(point * np.eye(5) - plant.system.A) @ plant.system.B[:, :2]
+    K = c.C @ np.linalg.inv(point * np.eye(3) - c.A) @ c.B + c.D
+    assert_allclose(whole._returned(plant, c, np.array([130.0]))[0], np.eye(2) - G @ K, rtol=1e-9)

@@ -104,3 +104,25 @@ def test_a_controller_along_directions_closes_the_same_loop_on_the_axes():
     assert_allclose(np.diag(turned.system.D[2:, 2:]), np.linalg.norm(noise, axis=1), rtol=1e-12)
     assert directions.along(plant, ALONG_AXES) is plant
     assert directions.on_axes(controller, ALONG_AXES) is controller
+
+
+def test_a_plant_along_directions_that_are_not_at_right_angles_is_its_own_turned_and_back():
+    """Commands, residuals, readings and the size of their noise, each number another one."""
+    rng, angles = np.random.default_rng(3), (math.radians(20.0), math.radians(-65.0))
+    D = np.zeros((4, 5))
+    D[2:, 3:] = [[0.3, 0.0], [0.0, 0.7]]
+    s = lti.StateSpace(*(rng.standard_normal(shape) for shape in ((3, 3), (3, 5), (4, 3))), D)
+    plant = WholePlant(1e-3, s, 2, 1, 2.0)
+    found, M = directions.along(plant, angles), np.array([np.cos(angles), np.sin(angles)])
+    back = np.linalg.inv(M)
+    assert_allclose(found.system.B, np.column_stack([s.B[:, :2] @ M, s.B[:, 2:]]))
+    assert_allclose(found.system.C, np.vstack([back @ s.C[:2], back @ s.C[2:]]), rtol=1e-12)
+    assert_allclose(found.system.D[2:, 3:], np.diag(np.hypot(back[:, 0] * 0.3, back[:, 1] * 0.7)), rtol=1e-12)
+    assert not found.system.D[:2].any()
+    c = lti.StateSpace(*(rng.standard_normal(shape) for shape in ((2, 2), (2, 2), (2, 2), (2, 2))))
+    made = directions.on_axes(WholeController("c", c, rng.standard_normal((2, 2))), angles)
+    at = np.array([90.0])
+    there = lti.frequency_response(c, at, 1e-3)[0]
+    assert_allclose(lti.frequency_response(made.system, at, 1e-3)[0], M @ there @ back, rtol=1e-10)
+    assert directions.along(plant, directions.ALONG_AXES) is plant
+    assert directions.on_axes(made, directions.ALONG_AXES) is made

@@ -14,6 +14,7 @@ from scipy.signal import welch
 
 from loops import discrete_psd
 from microrad.core import lti
+from microrad.core.units import format_quantity
 from microrad.loop import disturbance
 from microrad.loop.disturbance import (
     MICIUS_EDGES_HZ,
@@ -1053,3 +1054,168 @@ def test_a_refusal_of_a_table_says_its_line_and_what_stands_there(call, error, w
 ])  # fmt: skip
 def test_a_table_is_read_in_its_unit(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+# ------------------------------------------------------------------------------------- sizes, orders and edges unlike
+def test_a_sampled_disturbance_is_its_lines_first_and_then_the_filter_in_every_block():
+    """Two lines and five states: turns, start and outputs by definition."""
+    found = discretise(SHAKEN, 2e-3)
+    turns = [np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) for a in 2 * pi * 2e-3 * np.array([21, 48.3])]
+    expected = np.zeros((9, 9))
+    expected[:2, :2], expected[2:4, 2:4], expected[4:, 4:] = *turns, expm(SHAKEN.A * 2e-3)
+    assert_allclose(found.Ad, expected, rtol=1e-12, atol=1e-12)
+    assert_allclose(found.C, [[1, 0, 1, 0, *SHAKEN.C[0]]], rtol=0, atol=0)
+    assert_allclose(found.line_amplitude_rad, [2e-9 * 441 / sqrt(2), 7e-10 * 441 / sqrt(2)], rtol=1e-12)
+    assert not found.Bd[:4].any() and not found.initial[:4].any() and not found.initial[:, :4].any()
+    start = found.initial @ found.initial.T
+    noise = SHAKEN.variance_rad2 - 0.5 * np.sum(found.line_amplitude_rad**2)
+    assert (found.C @ start @ found.C.T).item() == pytest.approx(noise, rel=1e-9)
+    assert_allclose(found.Ad @ start @ found.Ad.T + found.Bd @ found.Bd.T, start, rtol=1e-9, atol=1e-9 * np.max(start))
+
+
+def test_a_start_of_several_runs_has_each_line_at_its_own_phase_and_more_phases_are_not_used():
+    found = discretise(SHAKEN, 2e-3)
+    numbers, phases = philox(4).standard_normal((9, 3)), philox(5).uniform(0, 2 * pi, (3, 3))
+    start = initial_state(found, numbers, phases)
+    a, b = found.line_amplitude_rad
+    rows = [a * np.sin(phases[0]), a * np.cos(phases[0]), b * np.sin(phases[1]), b * np.cos(phases[1])]
+    assert_allclose(start[:4], rows, rtol=1e-14)
+    assert_allclose(start[4:], found.initial[4:, 4:] @ numbers[4:], rtol=1e-14)
+    assert_allclose(initial_state(found, numbers[:, 1], phases[:2, 1]), start[:, 1], rtol=1e-13)
+    with pytest.raises(ValueError, match="with 2 lines needs 9 rows of normal numbers and 2 phases, not 9 and 1"):
+        initial_state(found, numbers, phases[:1])
+
+
+def test_a_line_at_half_the_sample_rate_is_refused_behind_one_below_it_that_is_taken():
+    below, at = (replace(SHAKEN, lines=(SpectralLine(1e-6, 30.0), SpectralLine(2e-6, f))) for f in (249.9, 250.0))
+    assert discretise(below, 2e-3).line_amplitude_rad.tolist() == [1e-6, 2e-6]
+    with pytest.raises(ValueError, match=r"a line at 250 Hz cannot be sampled every 0\.002 s, which ends at 250 Hz"):
+        discretise(at, 2e-3)
+
+
+@pytest.mark.parametrize(("convention", "part"), [("radial", 0.5), ("per-axis", 1.0)])
+def test_a_fit_of_bands_says_what_it_was_asked_has_and_has_elsewhere(convention, part):
+    edges, rms = np.array([0.4, 3.0, 17.0, 60.0]), np.array([5e-6, 2.3e-6, 1.1e-6])
+    fit = fit_bands(edges, rms, convention=convention, name="shaker", source="a table")
+    assert_allclose(fit.edges_hz, edges, rtol=0)
+    assert_allclose(fit.requested_rms_rad, rms * sqrt(part), rtol=1e-14)
+    assert_allclose(fit.achieved_rms_rad, band_rms(fit.disturbance, edges), rtol=1e-12)
+    rest = fit.disturbance.variance_rad2 - np.sum(fit.achieved_rms_rad**2)
+    assert fit.outside_rms_rad == pytest.approx(sqrt(rest), rel=1e-9)
+    assert (fit.disturbance.name, fit.disturbance.source, fit.disturbance.B.shape[1]) == ("shaker", "a table", 1)
+    told = fit.disturbance.basis.split("; ")
+    asked = [format_quantity(x, "rad") for x in rms * sqrt(part)]
+    had = [format_quantity(x, "rad") for x in fit.achieved_rms_rad]
+    bands = zip(("0.4 to 3", "3 to 17", "17 to 60"), had, asked, strict=True)
+    assert told[0].endswith(" terms, rms per axis: " + ", ".join(f"{b} Hz {a} for {w}" for b, a, w in bands))
+    assert told[1] == f"elsewhere {format_quantity(fit.outside_rms_rad, 'rad')}"
+    assert told[2] == f"worst {fit.worst_db:+.2f} dB near {fit.worst_at_hz:.4g} Hz"
+    db = 20 * np.log10(fit.achieved_rms_rad / fit.requested_rms_rad)
+    assert fit.worst_db == pytest.approx(db[np.argmax(abs(db))], rel=0.05, abs=5e-3)
+
+
+def test_a_table_that_begins_at_0_hz_within_a_decade_has_bands_at_its_ends_and_its_decades_alone():
+    freq = np.concatenate([[0.0], np.geomspace(0.3, 250.0, 60)])
+    S = 3e-12 / (1 + (freq / 2.5) ** 2)
+    fit = fit_table(freq, S, convention="radial", name="t", source="s")
+    inner = freq[1:][np.searchsorted(freq[1:], [1.0, 10.0, 100.0])]
+    assert_allclose(fit.edges_hz, [0.3, *inner, 250.0], rtol=1e-14)
+    true = [0.5 * 3e-12 * 2.5 * (np.arctan(b / 2.5) - np.arctan(a / 2.5)) for a, b in pairwise(fit.edges_hz)]
+    assert_allclose(fit.requested_rms_rad, np.sqrt(true), rtol=1e-3)
+    assert_allclose(fit.achieved_rms_rad, np.sqrt(true), rtol=0.01)
+    assert fit.disturbance.basis.startswith("fit of 1 term, rms per axis: 0.3 to ")
+    assert (fit.disturbance.name, fit.disturbance.source) == ("t", "s")
+
+
+ON_EDGES = replace(SHAKEN, lines=(SpectralLine(3e-6, 2.0), SpectralLine(5e-6, 9.0), SpectralLine(7e-6, 40.0)))
+
+
+@pytest.mark.parametrize(
+    ("edges", "with_lines"),
+    [([2.0, 9.0, 40.0], [9, 25]), ([0.0, 2.0, 40.0], [0, 34]), ([1.0, 40.0, inf], [34, 49]), ([9.5, 39.0], [0])],
+)
+def test_a_line_on_an_edge_counts_in_the_band_above_it_alone(edges, with_lines):
+    more = band_rms(ON_EDGES, np.array(edges)) ** 2 - band_rms(replace(SHAKEN, lines=()), np.array(edges)) ** 2
+    assert_allclose(more * 1e12, 0.5 * np.array(with_lines), rtol=1e-9, atol=1e-9)
+
+
+def test_disturbances_of_one_source_name_it_once_where_it_first_stands():
+    parts = [replace(resonance(f), source=s, name=n) for f, s, n in ((9, "b", "x"), (5, "a", "y"), (7, "b", "x"))]
+    found = combine(*parts)
+    assert (found.name, found.source, found.basis) == ("x + y + x", "b; a", "test; test; test")
+    for i, part in enumerate(parts):
+        own = slice(2 * i, 2 * i + 2)
+        assert_allclose(found.A[own, own], part.A)
+        assert_allclose(found.B[own, i], part.B[:, 0])
+        assert_allclose(found.C[0, own], part.C[0])
+
+
+def test_a_wheel_has_each_harmonics_own_coefficient_and_says_how_many_at_what_speed():
+    found = wheels(12.5, (1.0, 2.0, 5.2), (4e-9, 0.0, 9e-10), convention="per-axis", source="a test")
+    assert [line.freq_hz for line in found.lines] == [12.5, 25.0, 65.0]
+    assert [line.amplitude_rad for line in found.lines] == pytest.approx([6.25e-7, 0.0, 1.40625e-7], rel=1e-12)
+    assert found.basis == "amplitudes C_i speed^2 of 3 harmonics at 12.5 turns a second, per-axis"
+    assert (found.name, found.source, found.A.size) == ("reaction wheel", "a test", 0)
+
+
+def test_body_pointing_given_radial_has_half_its_power_on_an_axis_and_says_so():
+    found = body_pointing(250e-6, 2.5, 0.35, convention="radial")
+    assert found.rms_rad == pytest.approx(1e-4 / sqrt(2), rel=1e-12)
+    assert found.basis == "250 µrad at 2.5 sigma, radial; second-order low pass of damping 0.707 at 0.35 Hz"
+    assert psd(found, np.array([0.35]))[0] == pytest.approx(0.5 * psd(found, np.array([0.0]))[0], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("heading", "scale"),
+    [
+        ("frequency (Hz), S (rad^2/Hz)", 1.0), ("f/Hz | PSD nrad**2 / Hz", 1e-18), ("Hz URAD2_HZ", 1e-12),
+        ("# Hz, mrad²/Hz", 1e-6), ("# Hz\n# μrad^2 per hz", 1e-12), ("Hz, urad^2/Hz, again urad²/Hz", 1e-12),
+    ],
+)  # fmt: skip
+def test_a_unit_is_read_however_it_is_written(heading, scale):
+    freq, found = typed(heading, "+0.5 7", ".75 11", "2e1 13")
+    assert_allclose(freq, [0.5, 0.75, 20.0], rtol=0)
+    assert_allclose(found, scale * np.array([7.0, 11.0, 13.0]), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("rows", "fault"),
+    [
+        (("1 2", "inf 3", "4 -1"), "line 4: (inf Hz, 3e-12 rad^2/Hz) holds a number that is not finite; remove the "
+                                   "row"),
+        (("4 2", "-1 3", "2 -1"), "line 4: (-1 Hz, 3e-12 rad^2/Hz) has a negative frequency; give a one-sided "
+                                  "spectrum, from 0 Hz up"),
+        (("4 2", "1 3", "2 -1"), "line 6: (2 Hz, -1e-12 rad^2/Hz) has a negative density; give rad^2/Hz, not decibels"),
+        (("1 2", "1 3", "0.5 1"), "line 4: (1 Hz, 3e-12 rad^2/Hz) does not rise in frequency above the row before; "
+                                  "sort the rows and remove doubles"),
+    ],
+)  # fmt: skip
+def test_of_two_faults_of_a_table_the_graver_is_named_with_its_line_behind_remarks(rows, fault):
+    with pytest.raises(ValueError) as refused:
+        typed(WITH_UNIT, "", rows[0], rows[1], "# a remark", rows[2])
+    assert str(refused.value) == f"measured.csv, {fault}"
+
+
+def test_an_unreadable_table_is_refused_with_the_systems_reason(tmp_path, monkeypatch):
+    def failing(path, most):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    (tmp_path / "t.csv").write_text("x", "utf-8")
+    monkeypatch.setattr(tables, "read_bytes", failing)
+    with pytest.raises(ValueError, match=r"t\.csv: the table cannot be read as text \(Permission denied\); save it as"):
+        read_table(tmp_path / "t.csv")
+
+
+def test_a_resonance_of_two_inputs_and_a_line_keep_their_words_as_one_input():
+    two = replace(SHAKEN, name="two", basis="b", source="s")
+    found = one_input(two)
+    assert (found.name, found.basis, found.source, found.lines) == ("two", "b", "s", two.lines)
+    assert found.rms_rad == pytest.approx(two.rms_rad, rel=1e-6)
+
+
+@pytest.mark.parametrize(("period_s", "time_s", "place"), [(0.02, 0.0299, 1), (0.02, 0.0301, 2), (0.5, 99.0, 3)])
+def test_a_sampled_reference_is_that_of_the_nearest_sample_and_its_last_behind_them(period_s, time_s, place):
+    samples = np.array([5.0, -2.0, 11.0, 7.0])
+    found = disturbance.SampledReference(samples, period_s)
+    assert found.at(time_s) == samples[place]
+    assert (found.point_ahead_rad, found.line_of_sight_rate_rad_s, found.body_bandwidth_hz) == (0.0, 0.0, 1.0)

@@ -612,3 +612,80 @@ def test_poles_that_are_the_same_but_for_rounding_count_once(apart):
     alone = analysis.around_poles(np.array([pole]), PERIOD, 1.1)
     assert_allclose(np.sort(points(apart)), np.sort(alone), rtol=apart)
     assert points(0.5).size > 1.9 * alone.size
+
+
+# ------------------------------------------------------------------------------------------------ loops in closed form
+def test_each_margin_of_a_loop_in_closed_form_with_crossings_on_both_sides():
+    """L = 3 / ((1 + i f / 5) (1 + i f / 90)) with a delay of 4 ms: every field from its own equation."""
+
+    def response(freq_hz):
+        f = np.asarray(freq_hz)
+        return 3.0 / ((1 + 1j * f / 5.0) * (1 + 1j * f / 90.0)) * np.exp(-2j * np.pi * f * 4e-3)
+
+    dense = np.linspace(1e-3, 400.0, 4_000_001)
+    L = response(dense)
+    found = analysis.margins_of(response, np.geomspace(1e-3, 400.0, 700))
+    cross = dense[np.argmax(np.abs(L) < 1.0)]
+    at = np.flatnonzero((L.imag[:-1] < 0) & (L.imag[1:] >= 0) & (L.real[1:] < 0))[0]
+    lag = np.angle(-response(cross))
+    sensitivity = 1.0 / np.abs(1.0 + L)
+    expected = {
+        "gain_up": -1.0 / L.real[at], "gain_down": 0.0, "phase_rad": abs(lag), "delay_s": lag / (2 * np.pi * cross),
+        "modulus": 1.0 / np.max(sensitivity), "disk": 2.0 * np.min(np.abs(1.0 + L) / np.abs(1.0 - L)),
+        "crossover_hz": cross, "bandwidth_hz": dense[np.argmax(sensitivity >= 1.0)], "peak": np.max(sensitivity),
+        "peak_hz": dense[np.argmax(sensitivity)],
+    }  # fmt: skip
+    for name, value in expected.items():
+        assert getattr(found, name) == pytest.approx(value, rel=2e-4, abs=1e-12), name
+    low, high = found.disk_gain
+    assert (low, low * high) == pytest.approx(((1 - found.disk / 2) / (1 + found.disk / 2), 1.0), rel=1e-12)
+    assert found.disk_phase_rad == pytest.approx(2 * math.atan(found.disk / 2), rel=1e-12)
+
+
+@pytest.mark.parametrize(("disk", "gain"), [(2.0, (0.0, math.inf)), (3.5, (0.0, math.inf)), (math.inf, (0.0, math.inf)),
+                                            (0.5, (0.6, 1 / 0.6)), (0.0, (1.0, 1.0))])  # fmt: skip
+def test_a_disk_of_two_or_more_bears_any_gain(disk, gain):
+    assert analysis.DiskMargin(disk).disk_gain == pytest.approx(gain, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("distance", "bandwidth"),
+    [
+        ([1.0, 2.0, 3.0, 4.0], 0.0), ([4.0, 3.0, 2.0, 1.5], 27.0), ([4.0, 2.0, 0.5, 3.0], 3.0 * math.sqrt(3.0)),
+        ([2.0, 1.0, 4.0, 0.5], 3.0), ([3.0, 2.0, 1.5, 1.0], 27.0),
+    ],
+)  # fmt: skip
+def test_a_bandwidth_lies_between_the_points_of_its_grid_as_a_power_of_frequency(distance, bandwidth):
+    assert analysis.bandwidth_hz(np.array([1.0, 3.0, 9.0, 27.0]), np.array(distance)) == pytest.approx(
+        bandwidth, rel=1e-12
+    )
+
+
+def test_what_an_input_reaches_goes_by_the_entries_of_the_states_in_any_order():
+    """A chain 3 -> 0 -> 4 -> 1 that a second input enters at 4, and state 2 that drives all and is driven by none."""
+    A = np.zeros((5, 5))
+    A[0, 3], A[4, 0], A[1, 4], A[:, 2] = -0.2, 1e-12, 3.0, 5.0
+    B = np.zeros((5, 2))
+    B[3, 0], B[4, 1] = 1e-9, -2.0
+    assert analysis.reachable(A, B[:, :1]).tolist() == [True, True, False, True, True]
+    assert analysis.reachable(A, B[:, 1:]).tolist() == [False, True, False, False, True]
+    assert analysis.reachable(A, B * 0).tolist() == [False] * 5
+
+
+def test_variances_of_three_outputs_by_two_sequences_are_the_sums_of_their_squared_answers():
+    A, B = np.array([[0.5, 0.3], [-0.2, 0.7]]), np.array([[1.0, 0.2], [0.0, -3.0]])
+    C, D = np.array([[1.0, 0.0], [2.0, -1.0], [0.0, 0.5]]), np.array([[0.0, 1.0], [0.3, 0.0], [0.0, -2.0]])
+    expected, power = D**2, B
+    for _ in range(400):
+        expected, power = expected + (C @ power) ** 2, A @ power
+    assert_allclose(analysis.h2(lti.StateSpace(A, B, C, D)), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1.1, 2.0])
+def test_points_around_a_pole_reach_five_times_its_frequency_or_twice_its_width_in_even_factors(ratio):
+    s = -0.05 * 300.0 + 300.0j
+    found = analysis.around_poles(np.exp(2 * np.pi * PERIOD * np.array([s, s.conjugate()])), PERIOD, ratio)
+    above = found[found > 300.0 * (1 + 1e-9)] - 300.0
+    whole = 0.2 * 15.0 * np.exp(np.linspace(0, math.log(100.0), math.ceil(math.log(100.0) / math.log(ratio)) + 1))
+    assert_allclose(above, whole[whole < 0.5 / PERIOD - 300.0], rtol=1e-6)
+    assert_allclose(300.0 - found[found < 300.0 * (1 - 1e-9)][::-1], whole[whole < 300.0 * (1 - 1e-9)], rtol=1e-6)

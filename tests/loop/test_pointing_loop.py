@@ -1368,3 +1368,98 @@ def test_the_kernels_are_compiled_aside_for_loops_of_any_kind_where_the_cache_la
     compiled = list(kernels.ensemble_loop.signatures)
     ensemble.simulate(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)
     assert kernels.ensemble_loop.signatures == compiled != []
+
+
+# ----------------------------------------------------------------------------- parts of numbers unlike each other
+def an_ensemble():
+    """Three runs of two axes, every number another one."""
+    counts = np.arange(1.0, 3.0 * kernels.COUNT_FIELDS + 1).reshape(3, -1)
+    histogram = np.zeros((3, kernels.BINS), dtype=np.int32)
+    histogram[0, 100:103], histogram[1, 102], histogram[2, 110] = (5, 0, 7), 11, 13
+    rms, mean = np.array([[3.0, 4.0], [1.0, 2.0], [2.0, 6.0]]), np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]])
+    freq, spectrum = np.array([0.0, 5.0]), np.array([[1.0, 2.0], [3.0, 4.0]])
+    return ensemble.Ensemble(
+        "PI", 0.7, rms, mean, np.array([9.0, 8.0, 7.0]), histogram, counts, freq, spectrum, 36, 360, 12
+    )
+
+
+def test_statistics_of_several_runs_and_axes_are_means_of_their_squares():
+    found = an_ensemble()
+    squares = np.array([25.0, 5.0, 40.0])
+    assert_allclose(found.axis_rms_rad, [sqrt(14 / 3), sqrt(56 / 3)], rtol=1e-12)
+    assert found.radial_rms_rad == pytest.approx(sqrt(70 / 3), rel=1e-12)
+    spread = np.std(squares, ddof=1) / sqrt(3)
+    assert found.radial_rms_interval_rad(2.0) == pytest.approx(2.0 * spread / 2 / sqrt(70 / 3), rel=1e-12)
+    assert found.part(1, 1).radial_rms_interval_rad() == inf
+    part = found.part(1, 2)
+    assert_allclose([*part.rms_rad[0], *part.mean_rad[1], *part.largest_rad], [1.0, 2.0, 0.5, 0.6, 8.0, 7.0])
+    assert (part.histogram.sum(), part.counts[0, 0], part.seconds) == (24, 1.0 + kernels.COUNT_FIELDS, 0.7)
+    assert part.psd_rad2_hz is found.psd_rad2_hz
+
+
+@pytest.mark.parametrize("limit", ensemble.COUNTERS)
+def test_a_limit_is_met_as_often_as_it_could_have_been(limit):
+    counter = ensemble.COUNTERS[limit]
+    times = {"saturated samples": 36, "inverse beyond the identified rate": 36, "samples without the spot": 12}
+    expected = (counter + 1.0 + kernels.COUNT_FIELDS) / times.get(limit, 360)
+    assert an_ensemble().share(counter) == pytest.approx(expected, rel=1e-12)
+    short = replace(an_ensemble(), readings=0).share(counter)
+    assert short == pytest.approx(expected * 12 if limit == "samples without the spot" else expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("share", "bin_", "inside"),
+    [(0, 100, 0), (2.5 / 36, 100, 0.5), (5 / 36, 100, 1), (14 / 36, 102, 0.5), (23 / 36, 102, 1), (1, 110, 1)],
+)
+def test_a_quantile_of_bins_with_gaps_is_linear_in_the_square_and_beyond_it_lies_the_rest(share, bin_, inside):
+    low, high = ensemble.bin_edges_rad()[bin_ : bin_ + 2] ** 2
+    found = an_ensemble().quantile_rad(share)
+    assert found == pytest.approx(sqrt(low + inside * (high - low)), rel=1e-12)
+    assert an_ensemble().beyond(found) == pytest.approx(1.0 - share, abs=1e-9)
+
+
+def test_of_no_samples_there_is_no_quantile_and_below_all_bins_lies_nothing():
+    none = replace(an_ensemble(), histogram=np.zeros((3, kernels.BINS), dtype=np.int32))
+    assert np.isnan([none.quantile_rad(0.5), none.beyond(1e-6)]).all()
+    assert (an_ensemble().beyond(-1.0), an_ensemble().beyond(0.0), an_ensemble().beyond(inf)) == (1.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("samples", [8, 9, 1])
+def test_a_periodogram_of_two_axes_is_the_mean_over_the_runs_under_a_hann_window(samples):
+    residual = np.random.default_rng(3).standard_normal((samples, 2, 5))
+    window = np.sin(np.pi * np.arange(samples) / samples) ** 2
+    found = ensemble._periodogram(residual, 0.02)
+    expected = np.zeros((samples // 2 + 1, 2))
+    for axis, run in np.ndindex(2, 5):
+        turned = np.exp(-2j * np.pi * np.outer(np.arange(samples // 2 + 1), np.arange(samples)) / samples)
+        expected[:, axis] += np.abs(turned @ (window * residual[:, axis, run])) ** 2 / 5
+    expected *= 0.04 / max(np.sum(window**2), 1e-300)
+    expected[[0, -1]] /= 2.0
+    assert_allclose(found, expected, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("period_s", [1e-3, 0.05])
+def test_a_reference_filter_has_its_target_at_the_end_of_the_sample_and_the_rate_as_its_slope(period_s):
+    """From rest, of a unit step: 1 - (1 + w t) e^-wt and w^2 t e^-wt."""
+    s, w = fine.ReferenceFilter(7.0).discrete(period_s), 2 * pi * 7.0
+    x = np.zeros((2, 1))
+    for k in range(1, 6):
+        target, rate = (s.C @ x + s.D)[:, 0]
+        x, t = s.A @ x + s.B, k * period_s
+        assert (target, rate) == pytest.approx((1 - (1 + w * t) * exp(-w * t), w * w * t * exp(-w * t)), rel=1e-9)
+
+
+def test_drives_of_more_actuators_than_axes_leave_what_is_held_and_are_the_least_beside_it():
+    """Four actuators without a model to invert, two angles and a held sum: against a constrained least squares."""
+    rng = np.random.default_rng(6)
+    optics, gain, held = rng.standard_normal((2, 3)), rng.standard_normal((3, 4)) * 1e-5, rng.standard_normal((1, 3))
+    plain = lti.StateSpace(-np.eye(3), gain, np.eye(3), np.zeros((3, 4)))
+    made = replace(mirror.Mirror.of_system(plain, "m"), inverse=())
+    drive, sensor = Drive(-1.0, 1.0, inf, inf, 0.0, 0.0), OpticalSensor(0.0, inf, 0.0, 1, 0)
+    still = (disturbance.NO_REFERENCE,) * 2
+    given = PointingLoop(made, optics, drive, Timing(1e-3, 2, 0), ((), ()), sensor, None, still, held=held)
+    for loop, rows in ((given, np.vstack([optics @ gain, held @ gain])), (replace(given, held=None), optics @ gain)):
+        drives = np.linalg.pinv(rows)[:, :2]
+        assert_allclose(fine._drives_for_angles(loop), drives, rtol=1e-6)
+        assert fine.nominal_axis_gain(loop) == pytest.approx(1.0 / np.max(np.abs(drives)), rel=1e-6)
+        assert_allclose(optics @ gain @ fine.decoupling(loop), np.eye(2) * fine.nominal_axis_gain(loop), atol=1e-12)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from types import SimpleNamespace
 
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from scipy.stats import kstest
+from scipy.special import polygamma
+from scipy.stats import chi2, kstest, norm
 
 from microrad.loop.disturbance import (
     Disturbance,
@@ -26,7 +28,15 @@ from microrad.loop.disturbance import (
 from microrad.loop.disturbance.recorded import density, edge_s, recorded_motion, resampled
 from microrad.loop.disturbance.recorded_fit import fit_recording
 from microrad.loop.disturbance.recorded_lines import find_lines
-from microrad.loop.disturbance.recorded_tests import one_step_residual, stationarity, whiteness
+from microrad.loop.disturbance.recorded_tests import (
+    BlockTest,
+    Stationarity,
+    Whiteness,
+    correlation_s,
+    one_step_residual,
+    stationarity,
+    whiteness,
+)
 from microrad.loop.disturbance.terms import Term, term_filter
 from microrad.loop.pointing_loop import played
 from microrad.loop.pointing_loop.ensemble import Span, simulate
@@ -517,3 +527,126 @@ OWN = recorded_motion(MOVING, 2.5e-3, "tracker")
 ])  # fmt: skip
 def test_parts_of_a_recording_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+# ------------------------------------------------------------------------------------- rates, lengths and tests unlike
+@pytest.mark.parametrize(
+    ("own_hz", "loop_hz", "up", "down"),
+    [
+        (622.08, 1000.0, 3125, 1944), (1000.0, 622.08, 1944, 3125), (1500.0, 1000.0, 2, 3), (3000.0, 1000.0, 1, 3),
+        (1000.0, 1000.00005, 1, 1), (1000.0, 2000.0001, 2, 1), (1000.0, 1001.0, 1001, 1000), (30.0, math.pi, 710, 6780),
+    ],
+)  # fmt: skip
+def test_a_ratio_of_rates_is_that_of_the_smallest_whole_numbers_that_clocks_tell_from_it(own_hz, loop_hz, up, down):
+    assert recorded._in_whole_numbers(loop_hz / own_hz) == Fraction(up, down)
+
+
+@pytest.mark.parametrize("loop_hz", [622.08, 400.0, 250.0, 1244.16, 90.0])
+def test_a_drifting_sine_is_itself_at_any_rate_and_ends_with_the_recording(loop_hz):
+    rate, count = 400.0, 1201
+
+    def motion(time):
+        return 3e-6 + 2e-6 * time + 1e-6 * np.sin(2 * np.pi * 13.7 * time + 0.4)
+
+    found = resampled(recorded_motion(motion(np.arange(count) / rate), 1 / rate), 1 / loop_hz)
+    assert found.size == math.floor((count - 1) / rate * loop_hz * (1 + 1e-9)) + 1
+    edge = math.ceil(edge_s(recorded_motion(MOVING, 1 / rate), 1 / loop_hz) * loop_hz)
+    inner = slice(edge, found.size - edge)
+    time = np.arange(found.size) / loop_hz
+    assert_allclose(found[inner], motion(time)[inner], rtol=0, atol=4e-10)
+
+
+def test_mean_and_slope_of_an_even_number_of_samples_are_those_of_least_squares_about_the_middle():
+    step, rad = 0.004, 1e-6 * np.cumsum(np.random.default_rng(4).standard_normal(206))
+    found, time = recorded_motion(rad, step, "a"), 0.004 * np.arange(206)
+    slope, at_begin = np.polyfit(time, rad, 1)
+    assert (found.mean_rad, found.slope_rad_s) == pytest.approx((np.mean(rad), slope), rel=1e-9)
+    assert_allclose(found.trend_rad(time), at_begin + slope * time, rtol=1e-9)
+    assert_allclose(found.rest_rad, rad - at_begin - slope * time, rtol=0, atol=1e-15)
+    assert (found.duration_s, found.half_rate_hz, found.name) == (pytest.approx(0.82), pytest.approx(125.0), "a")
+
+
+@pytest.mark.parametrize(("count", "parts", "segments"), [(403, 8, 15), (400, 3, 4), (407, 1, 1), (401, 2, 3)])
+def test_the_density_of_a_length_that_segments_do_not_divide_is_welchs(count, parts, segments):
+    rad = np.random.default_rng(8).standard_normal(count)
+    freq, power, number = density(rad, 2.5e-3, parts)
+    length = count // parts
+    window = np.hanning(length + 1)[:-1]
+    cut = [rad[at : at + length] * window for at in range(0, count - length + 1, length - length // 2)]
+    expected = 2 * 2.5e-3 * np.mean([np.abs(np.fft.rfft(each)) ** 2 for each in cut], axis=0) / np.sum(window**2)
+    expected[[0] if length % 2 else [0, -1]] /= 2
+    assert len(cut) == number == segments
+    assert_allclose(power, expected, rtol=1e-9, atol=1e-12 * np.max(expected))
+    assert_allclose(freq, np.arange(length // 2 + 1) / (length * 2.5e-3), rtol=1e-12)
+
+
+MOVES = BlockTest("the gust", 3.4567, 2.3456, 5e-4, 0.4567, 5e-4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict"),
+    [
+        ({}, "the variance of the gust in 8 equal parts differs 3.46 times, and stationary motion of this spectrum "
+             "stays within 2.35 times"),
+        ({"ratio_p": 1e-3}, "the variance of the gust falls 2.19 times over the recording"),
+        ({"ratio": 1.21}, "the variance of the gust falls 2.19 times over the recording"),
+        ({"ratio": 1.2, "growth": 2.6789}, "the variance of the gust grows 2.68 times over the recording"),
+        ({"ratio_p": 0.5, "growth_p": 1e-3}, ""), ({"ratio_p": 0.5, "growth": 1.21}, ""),
+        ({"ratio_p": 0.5, "growth": 1 / 1.2}, ""), ({"ratio": 1.2101, "growth_p": 0.9}, "the variance of the gust in 8 "
+         "equal parts differs 1.21 times, and stationary motion of this spectrum stays within 2.35 times"),
+    ],
+)  # fmt: skip
+def test_a_motion_is_unsteady_for_what_chance_has_less_than_once_in_a_thousand_and_ten_percent_of_rms(changes, verdict):
+    found = replace(MOVES, **changes)
+    assert found.verdict == verdict
+    steady = replace(MOVES, ratio_p=0.5, growth_p=0.5)
+    assert Stationarity(found, steady).reason == Stationarity(steady, found).reason == verdict
+    assert Stationarity(found, steady).stationary is (verdict == "")
+    fast = replace(MOVES, of="its fast part")
+    assert Stationarity(found, fast).reason == fast.verdict
+
+
+def test_a_residual_is_white_up_to_the_thousandth_and_ljung_and_boxs_by_hand():
+    assert [Whiteness(20, 1.0, p, 0.1).white for p in (1e-3, 0.99e-3)] == [True, False]
+    found, z = whiteness(MOVING[:97], 3), MOVING[:97] - np.mean(MOVING[:97])
+    r = np.array([np.sum(z[k:] * z[:-k]) for k in range(1, 27)]) / np.sum(z**2)
+    statistic = 97 * 99 * np.sum(r**2 / (97 - np.arange(1, 27)))
+    assert (found.lags, found.statistic, found.largest) == (26, pytest.approx(statistic), pytest.approx(max(abs(r))))
+    assert found.p_value == pytest.approx(chi2.sf(statistic, 20), rel=1e-6)
+
+
+def test_growth_and_ratio_of_a_motion_whose_parts_have_known_variances():
+    """Eight parts of +-s, and three samples behind them that no part has."""
+    sizes = np.array([1.0, 1.2, 0.9, 1.5, 1.3, 1.8, 1.1, 1.6])
+    motion = np.append(np.repeat(sizes, 60) * np.tile([1.0, -1.0], 240), [50.0] * 3)
+    freq = np.arange(150.0)
+    S = 1.0 / (1.0 + (freq / 40.0) ** 2)
+    found = stationarity(S, motion, motion[:480]).motion
+    freedom = 2.0 / 8.0 * np.sum(S) ** 2 / np.sum(S**2)
+    slope = np.polyfit(np.arange(8), np.log(sizes**2), 1)[0]
+    assert (found.of, found.ratio) == ("the motion", pytest.approx((1.8 / 0.9) ** 2))
+    assert found.growth == pytest.approx(math.exp(7 * slope), rel=1e-9)
+    assert found.growth_p == pytest.approx(
+        2 * norm.sf(abs(slope) / math.sqrt(polygamma(1, freedom / 2) / 42)), rel=1e-6
+    )
+    drawn = np.random.default_rng(1).chisquare(freedom, (200_000, 8))
+    beyond = np.max(drawn, axis=1) / np.min(drawn, axis=1)
+    assert found.ratio_p == pytest.approx(np.mean(beyond > 4.0), abs=0.01)
+    assert np.mean(beyond > found.usual) == pytest.approx(1e-3, abs=4e-4)
+
+
+def test_a_motion_forgets_itself_where_its_correlation_first_falls_below_1_over_e():
+    kept = 0.93
+    rad = lfilter([1.0], [1.0, -kept], np.random.default_rng(6).standard_normal(60_000))
+    r = np.array([rad[k:] @ rad[: rad.size - k] for k in range(40)])
+    assert correlation_s(rad, 0.02) == pytest.approx(0.02 * np.argmax(r < r[0] / math.e), rel=1e-12)
+
+
+def test_lines_of_a_recording_are_told_strongest_above_their_surroundings_first_with_what_is_left():
+    rate, time = 500.0, np.arange(16_000) / 500.0
+    noise = lfilter([1.0], [1.0, -0.95], np.random.default_rng(2).standard_normal(time.size)) * 1e-8
+    waves = [3e-7 * np.sin(2 * np.pi * 31.71 * time + 1.0), 5e-7 * np.cos(2 * np.pi * 7.33 * time + 2.0)]
+    lines, rest = find_lines(noise + sum(waves), 1 / rate)
+    assert [line.freq_hz for line in lines] == pytest.approx([31.71, 7.33], rel=1e-5)
+    assert [line.amplitude_rad for line in lines] == pytest.approx([3e-7, 5e-7], rel=5e-3)
+    assert np.std(rest - noise) < 0.1 * np.std(noise)

@@ -15,7 +15,7 @@ from microrad.core import lti
 from microrad.loop.control import analysis, classical, descent, judge, lqg, search, tuning
 from microrad.loop.control.lqg import LQG
 from microrad.loop.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
-from microrad.loop.controller_study import designs
+from microrad.loop.controller_study import designs, promises
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED
@@ -615,3 +615,23 @@ def test_a_parameter_is_bound_where_a_step_away_from_its_end_costs(place, costs,
     assert tuning._pressed(SimpleNamespace(at=at), trial, 1) == said
     assert all(each == [0.3, pytest.approx(0.05 if place < 0.5 else 0.95, abs=2e-4)] for each in away)
     assert trial.place[1] == place
+
+
+def test_of_designs_for_larger_margins_that_hold_the_one_that_leaves_least_is_taken():
+    left = {0.52: (4.0, True), 0.64: (3.0, True), 0.76: (1.0, False), 0.88: (2.0, True)}
+    asked = []
+
+    def tuned(margin, out_of_reach=0.88):
+        asked.append(round(margin, 9))
+        if asked[-1] >= out_of_reach:
+            raise ValueError("out of reach")
+        return asked[-1]
+
+    def judged(designs):
+        return [SimpleNamespace(simulated_rad=left[each][0], holds=left[each][1]) for each in designs]
+
+    design, figure = promises.firmer(0.4, tuned, judged)
+    assert (design, figure.simulated_rad, asked) == (0.64, 3.0, [0.52, 0.64, 0.76, 0.88])
+    assert promises.firmer(0.4, lambda margin: tuned(margin, 2.0), judged)[0] == 0.88
+    assert promises.firmer(0.4, lambda margin: tuned(margin, 0.0), None) is None
+    assert promises.firmer(0.4, lambda margin: 0.76, judged) is None

@@ -1,12 +1,13 @@
 """Pointing errors in time windows: closed forms, quadrature of the weights, drawn motions, and the exposure's line."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.integrate import quad
+from scipy.integrate import quad, simpson
 
 from microrad.core import lti
 from microrad.loop import disturbance
@@ -405,3 +406,94 @@ def test_a_refusal_of_a_window_says_its_numbers(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+# ---- by definition, on densities and recordings that no other test has
+APART = [
+    ErrorIndex("APE"), ErrorIndex("MPE", 0.7), ErrorIndex("MKE", 0.7), ErrorIndex("RKE", 0.7), ErrorIndex("RPE", 0.04),
+    ErrorIndex("PDE", 0.7, 0.25), ErrorIndex("PRE", 0.3, 1.9), ErrorIndex("PDE", 0.25, 0.25), ErrorIndex("AKE"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("index", APART, ids=[f"{each.kind} {each.window_s} {each.spacing_s}" for each in APART])
+@pytest.mark.parametrize("sided", ["one", "two"])
+def test_a_density_of_several_slopes_counts_as_its_integral_far_beyond_the_turns_of_its_windows(index, sided):
+    freq, S = np.array([0.5, 6.0, 8.0, 40.0]), np.array([3e-12, 2e-12, 2e-12, 1e-13])
+    total = 0.0
+    for f, s in zip(pairwise(freq), pairwise(S), strict=True):
+        grid = np.linspace(*f, 20_001)
+        level = np.exp(np.interp(np.log(grid), np.log(f), np.log(s)))
+        total += simpson(level * index.weight(grid), x=grid)
+    assert tabulated_rms(freq, S, index, sided) == pytest.approx(math.sqrt(total * (1 + (sided == "two"))), rel=1e-8)
+
+
+@pytest.mark.parametrize("index", APART, ids=[f"{each.kind} {each.window_s} {each.spacing_s}" for each in APART])
+def test_a_weight_is_that_of_its_cosines_and_of_the_difference_of_means_that_it_is_named_for(index):
+    freq = np.array([0.31, 1.7, 4.4, 23.0])
+    mean = np.ones(4) if index.window_s is None else (np.sin(np.pi * freq * index.window_s) / (np.pi * freq)) ** 2
+    mean = mean / (index.window_s or 1.0) ** 2
+    twice = 1.0 if index.spacing_s is None else 2.0 - 2.0 * np.cos(2 * np.pi * freq * index.spacing_s)
+    expected = 1.0 - mean if index.takes == "RPE" else twice * mean
+    assert_allclose(index.weight(freq), expected, rtol=1e-12, atol=1e-14)
+    cosines = sum(factor * np.cos(2 * np.pi * freq * time) / freq**2 for factor, time in index.cosines)
+    assert_allclose(cosines if index.cosines else np.ones(4), twice * mean, rtol=1e-9, atol=1e-13)
+    assert_allclose(index.weight(0.0), [1.0 if index.window_s is None or index.takes == "MPE" else 0.0], atol=0.0)
+
+
+@pytest.mark.parametrize("index", APART, ids=[f"{each.kind} {each.window_s} {each.spacing_s}" for each in APART])
+def test_a_recording_counts_window_by_window(index):
+    """Each window by itself, of a recording whose mean is far above its motion."""
+    step, rad = 0.01, MADE + 0.3
+    window, apart = (round(each / step) if each else 0 for each in (index.window_s, index.spacing_s))
+    cut = [rad[i : i + max(window, 1)] for i in range(rad.size - window + 1 - (not window))]
+    means = np.array([np.mean(each) for each in cut]) if window else rad
+    squares = {"APE": rad**2, "MPE": means**2, "RPE": np.array([np.var(each) for each in cut])}
+    squares |= dict.fromkeys(("PDE", "PRE"), (means[apart:] - means[: means.size - apart]) ** 2)
+    assert recorded_rms(rad, step, index) == pytest.approx(math.sqrt(np.mean(squares[index.takes])), rel=1e-6)
+
+
+@pytest.mark.parametrize("index", APART, ids=[f"{each.kind} {each.window_s} {each.spacing_s}" for each in APART])
+def test_motion_whose_modes_coincide_counts_as_its_density(index):
+    """Two equal poles have no modes, and three unlike ones of two inputs beside lines have."""
+    double = Disturbance(
+        "d", np.array([[-9.0, 5.0], [0.0, -9.0]]), np.diag([2e-6, 7e-6]), np.array([[1.0, 0.5]]), LINES.lines, "", ""
+    )
+    for motion in (double, disturbance.combine(RADIAL, resonance(3.0, 0.2), LINES)):
+        freq = np.concatenate([np.linspace(1e-4, 60.0, 30_001), np.geomspace(60.0, 1e6, 3_001)])
+        counted = index.weight(freq) * psd(motion, freq)
+        lines = sum(0.5 * each.amplitude_rad**2 * index.weight(each.freq_hz)[0] for each in motion.lines)
+        expected = simpson(counted[:30_001], x=freq[:30_001]) + simpson(counted[30_001:], x=freq[30_001:]) + lines
+        assert windowed_rms(motion, index) == pytest.approx(math.sqrt(expected), rel=3e-4)
+
+
+@pytest.mark.parametrize(
+    ("window", "spacing", "said"),
+    [
+        (0.014, None, "RPE: its times are shorter than two samples of 0.01 s: give longer ones"),
+        (0.015, None, None), (4.0, None, None), (4.02, None, "RPE looks at 4.02 s, and the recording is 4 s long: "
+                                                            "give shorter times or a longer recording"),
+        (1.5, 2.5, None), (1.5, 2.52, "PDE looks at 4.02 s, and the recording is 4 s long: give shorter times or a "
+                                      "longer recording"),
+    ],
+)  # fmt: skip
+def test_times_are_rounded_to_samples_before_they_are_held_against_the_recording(window, spacing, said):
+    index = ErrorIndex("RPE" if spacing is None else "PDE", window, spacing)
+    if said is None:
+        assert recorded_rms(MADE, 0.01, index) > 0.0
+        return
+    with pytest.raises(ValueError) as refused:
+        recorded_rms(MADE, 0.01, index)
+    assert str(refused.value) == said
+
+
+@pytest.mark.parametrize("kind", ["MPE", "MKE", "RPE", "RKE", "APE", "AKE"])
+def test_lines_beside_noise_count_by_the_rational_weight(kind):
+    index = ErrorIndex(kind, None if kind in ("APE", "AKE") else 0.02)
+    both = disturbance.combine(resonance(), LINES, replace(LINES, lines=(SpectralLine(5e-6, 11.0),)))
+    squares = [0.5 * 2e-6**2 * index.rational_weight(30.0)[0], 0.5 * 5e-6**2 * index.rational_weight(11.0)[0]]
+    expected = math.sqrt(rational_rms(resonance(), index) ** 2 + sum(squares))
+    assert rational_rms(both, index) == pytest.approx(expected, rel=1e-9)
+    s = 2j * np.pi * 11.0 * 0.02
+    shapes = {"MPE": 2 * (s + 6), "RPE": s * (s + math.sqrt(12.0)), "APE": s * s + 6 * s + 12}
+    expected = abs(shapes[index.takes] / (s * s + 6 * s + 12)) ** 2
+    assert index.rational_weight(11.0)[0] == pytest.approx(expected, rel=1e-12)

@@ -17,7 +17,7 @@ from microrad.loop.pointing_loop.design import design_plant, whole_plant
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.loop import assemble, assemble_whole, decoupling
 from microrad.loop.pointing_loop.windows import windowed_errors
-from microrad.loop.worst_case import APE, Extent, Simulated, Subject, in_time
+from microrad.loop.worst_case import APE, Extent, Simulated, Subject, batch, in_time, search
 from microrad.mirror import coupled, from_table, spread
 from microrad.mirror.hysteresis import rest_gain
 from microrad.mirror.model import linearised
@@ -269,3 +269,71 @@ def test_a_mirror_of_several_axes_moves_as_its_file_says():
     with pytest.raises(ValueError, match="has no table uncertainty, so nothing can be drawn; `microrad identify`"):
         worst_case.of_several_axes(replace(mirror, known=None))
     assert coupled.drawn(mirror, 2, 1)[1][0].mirror.A[0, 0] == coupled.draws(mirror, 2, 1)[1].mirror.A[0, 0]
+
+
+# ------------------------------------------------------------------------------------------------ its parts by hand
+def test_a_quantile_of_draws_is_the_value_of_a_draw_though_others_are_infinite():
+    values = np.array([3.0, np.inf, 1.0, 2.0, np.inf, 4.0, 5.0])
+    assert search._quantiles(values, 0.95) == worst_case.Quantiles(4.0, np.inf)
+    assert search._quantiles(values[[0, 2, 3, 5]], 0.05) == worst_case.Quantiles(2.0, 1.0)
+    assert search._quantiles(np.arange(1.0, 21.0), 0.95) == worst_case.Quantiles(10.0, 19.0)
+
+
+def test_directions_are_what_the_more_sensitive_leave_of_a_parameter_and_none_of_one_that_is_known_by_them():
+    rows = np.array([[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.6, 0.8, 5e-4], [0.0, 0.6, -0.8]])
+    found = search._independent(rows, [1, 2, 3, 0], 3)
+    third = rows[3] - (rows[3] @ rows[1]) * rows[1]
+    assert_allclose(found[:2], [rows[1], third / np.linalg.norm(third)], atol=1e-12)
+    left = rows[0] - found[:2].T @ (found[:2] @ rows[0])
+    assert_allclose(found[2], left / np.linalg.norm(left), atol=1e-9)
+    assert search._independent(rows, [3, 0], 1).tolist() == [rows[3].tolist()]
+    assert search._independent(rows, [], 2).shape == (0, 3)
+
+
+def test_a_sensitivity_is_its_largest_change_and_changes_count_either_way():
+    assert worst_case.Sensitivity("a", (0.1, 0.4), 0.3).largest == 0.4
+    assert worst_case.Sensitivity("a", (0.1,), 0.3).largest == 0.3
+    found = worst_case.Figures(
+        np.array([[2.0, 5.0], [1.0, 6.0], [3.0, 4.0]]), np.array([0.5, 0.4, 0.7]), np.array([0.9, 1.0, 2.0])
+    )
+    assert_allclose(search._changes(found), [[0.5, 0.2, 0.2], [0.5, 0.2, 0.4]])
+    assert found.unstable == 2
+
+
+@pytest.mark.parametrize(("axes", "used"), [(1, 1), (2, 2), (3, 3), (1, 2), (2, 4)])
+def test_a_loop_cut_at_either_place_is_that_of_its_matrices(axes, used):
+    """As many actuators as axes, or the same with a gauge of each behind the optical readings."""
+    rng = np.random.default_rng(3)
+    K, G = (
+        rng.standard_normal((4, *shape)) + 1j * rng.standard_normal((4, *shape))
+        for shape in ((axes, used), (used, axes))
+    )
+    for i in range(4):
+        closed = np.linalg.inv(np.eye(axes) - K[i][:, axes:] @ G[i][axes:])
+        optical = np.eye(axes) - G[i][:axes] @ closed @ K[i][:, :axes]
+        assert_allclose(batch._at_optical(K, G, axes)[i], optical, rtol=1e-10)
+        assert_allclose(batch._at_commands(K, G, axes)[i], np.eye(axes) - K[i] @ G[i], rtol=1e-12)
+        least = np.min(np.linalg.svd(optical)[1]) ** 2
+        assert_allclose(batch._least_squares(batch._at_optical(K, G, axes))[i], least, rtol=1e-9)
+
+
+def test_light_poles_are_told_by_loop_with_frequency_and_half_width():
+    period = 2e-4
+    s = 2 * np.pi * np.array([[-3.0 + 400j, -90.0 + 400j, -1.0 + 2498j], [-5.0 - 40j, -7.9 + 40j, -0.0 + 150j]])
+    row, freq, half = batch._light(np.exp(s * period), period)
+    assert row.tolist() == [0, 1, 1]
+    assert_allclose(freq, [400.0, 40.0, 150.0], rtol=1e-9)
+    assert_allclose(half, [3.0, 7.9, 1e-9 / period], rtol=1e-6)
+    grid = np.array([1.0, 100.0, 395.0, 399.0, 402.0, 900.0])
+    assert batch._seen_by(grid, (row, freq, np.array([1.5, 190.0, 400.0]))).tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("middle", "last", "said"),
+    [(1.0, 0.89, "settles"), (1.0, 0.91, "grows"), (1e-3, 0.0199, "settles"), (1e-3, 0.0201, "grows")],
+)
+def test_the_last_third_of_the_larger_axis_is_held_against_the_middle_one_and_the_offset(middle, last, said):
+    error = np.full((10, 2), 5.0)
+    error[3:7], error[7:] = 0.0, 0.0
+    error[5, 1], error[8, 0], error[9, 1] = -middle, -last, 0.3 * last
+    assert in_time.course(error, 2.0) == said
