@@ -1812,7 +1812,14 @@ def test_a_study_is_run_and_written_as_it_is_asked_for(call, folder, monkeypatch
 def test_a_report_that_differs_is_exit_1(call, monkeypatch, same):
     asked, found = [], SimpleNamespace(same=same)
     where = "microrad.report.results.reproduce"
-    monkeypatch.setattr(f"{where}.reproduce", lambda path, progress: asked.append((path, callable(progress))) or found)
+
+    def reproduced(path, progress):
+        for done in range(3):
+            progress(done, 3, "step")
+        asked.append((path, callable(progress)))
+        return found
+
+    monkeypatch.setattr(f"{where}.reproduce", reproduced)
     monkeypatch.setattr(f"{where}.reproduction_text", lambda found: f"in words: {found.same}")
     monkeypatch.setattr(f"{where}.reproduction_data", lambda found: {"same": found.same})
     assert call("reproduce", "a/report.html") == (int(not same), f"in words: {same}\n", "")

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import zipfile
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -483,3 +484,11 @@ def test_an_imported_mirror_that_cannot_be_read_leaves_the_one_that_is_there(ref
     where = "m-mirror.toml exists and is left as it is; choose another --output, or replace it with --overwrite."
     assert said == f"microrad: {where}\n"
     assert "sub/m.mat" in refused("import", "sub/m.mat", *IMPORT, "--overwrite")
+
+
+def test_a_mirror_is_sought_from_the_folder_of_work(monkeypatch):
+    asked = []
+    monkeypatch.setattr("microrad.mission.file.load_loop", lambda *files: asked.append(files) or ("mission", None))
+    assert cli_export._loaded(Path("days/day.toml"), Path("mine/mirror.toml")) == ("mission", None)
+    assert cli_export._loaded(Path("days/day.toml"), None) == ("mission", None)
+    assert asked == [(Path("days/day.toml"), Path("mine/mirror.toml")), (Path("days/day.toml"), None)]

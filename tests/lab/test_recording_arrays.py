@@ -506,3 +506,16 @@ def test_realisations_of_arrays_in_memory_are_named_and_joined_period_by_period(
             f"bench 2: drive has shape {drive.shape} and output {output.shape}; give (samples, channels, realisations, "
             "periods) with the same samples, realisations and periods."
         )
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_one_realisation_has_to_do_by_itself_where_no_other_is_judged_with_it(tmp_path, alone):
+    """Its second drive is twice the first."""
+    drive = np.stack([U[:, 0, 0, 0], 2.0 * U[:, 0, 0, 0]], axis=1)
+    np.savez(tmp_path / "a.npz", u=drive, y=drive[:, :1] + 0.1 * Y[:, :1, 0, 0])
+    words = {"axes": ("samples", "channels"), "rate_hz": RATE_HZ, "alone": alone}
+    if alone:
+        assert "is a copy of the input" in refusal(tmp_path / "a.npz", "u", "y", **words)
+    else:
+        (read,) = read_arrays(tmp_path / "a.npz", "u", "y", **words)
+        np.testing.assert_array_equal(read.drive, drive)

@@ -1933,3 +1933,19 @@ def test_an_index_of_three_axes_takes_the_channel_that_it_counts(tmp_path):
     np.testing.assert_array_equal(read.drive, np.column_stack([values[2, :, 1], values[0, :, 3]]))
     np.testing.assert_array_equal(read.output[:, 0], values[1, :, 2])
     assert read.input_names == ("w[2, 1]", "w[0, 3]")
+
+
+@pytest.mark.parametrize(
+    ("headers", "wanted", "column"),
+    [
+        ((("time", "drive", "out"), ("s", "drive", "drive")), "drive", 1),
+        ((("time", "a", "a"), ("out", "drive", "b")), "drive", 1),
+        ((("time", "2", "0"), ("2", "b", "c")), "2", 1),
+        ((("time", "a", "b"),), "2", 2),
+    ],
+)
+def test_a_name_is_that_of_the_first_row_of_headers_that_has_it(tmp_path, headers, wanted, column):
+    assert text_format.column_of(tmp_path, text_format.Layout(",", 3, headers, 3, "utf-8"), wanted, "input") == column
+    twice = text_format.Layout(",", 3, (("t", "u", "u"), ("t", "u", "y")), 3, "utf-8")
+    with pytest.raises(RecordingError, match="columns 1, 2 are all named 'u'; give the input column by its number"):
+        text_format.column_of(tmp_path, twice, "u", "input")

@@ -621,3 +621,13 @@ def test_the_second_of_two_validations_is_held_against_each_that_is_fitted(tmp_p
         ("recording.w", 20): "takes samples for validation that [recording.g] fits; two parts of the file (from, to) "
         "without common samples"
     }
+
+
+def test_for_a_list_that_is_missing_or_none_no_other_kind_of_file_is_asked(tmp_path):
+    binary = tmp_path / "list.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    for path in (binary, tmp_path, tmp_path / "none.toml"):
+        with pytest.raises(RecordingsError) as caught:
+            read_list(path)
+        (fault,) = caught.value.faults
+        assert fault.expected == "a list of recordings, with a table [recording.NAME] for each"

@@ -9,6 +9,7 @@ from made_tables import made, one_line, told
 from microrad.mission.fields import ProblemsError, Quantity
 from microrad.mission.file import MissionError, load_coupled_mirror, load_mirror, load_mission
 from microrad.mission.tables import coupled_mirror, coupled_parts
+from microrad.mission.tables import mirror as mirror_table
 from microrad.mission.tables.coupled_mirror import CoupledMirror, in_order, on_a_line, parameters
 from microrad.mission.tables.coupled_parts import (
     ActuatorTable,
@@ -1267,3 +1268,15 @@ def test_the_correlation_of_several_axes_is_whole_from_its_lower_triangle():
     table = made(UncertaintyTable, parameters=("a", "b", "c"), correlation=(0.1, 0.2, 0.3))
     assert table.correlation_matrix.tolist() == [[1.0, 0.1, 0.2], [0.1, 1.0, 0.3], [0.2, 0.3, 1.0]]
     assert made(UncertaintyTable, parameters=("a", "b")).correlation_matrix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize(("items", "told"), [(0, False), (1, True), (2, True), (3, False), (4, True), (6, True)])
+def test_correlations_of_three_parameters_are_three_or_none(items, told):
+    table = mirror_table.Uncertainty.model_construct(
+        parameters=("gain", "bouc_wen.d1", "linear.poles.1"),
+        standard_errors=(0.1, 0.2, 0.3),
+        correlation=(0.25,) * items,
+    )
+    found = [(each.key, each.reason, each.expected) for each in table.problems()]
+    wanted = ("correlation", f"has {items} items where 3 parameters have 3 pairs")
+    assert found == ([(*wanted, "3 numbers, the lower triangle without the diagonal, or none")] if told else [])

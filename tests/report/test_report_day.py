@@ -24,6 +24,7 @@ from microrad.orbit.day.assumptions import Numbers, Swing
 from microrad.orbit.operations import OperationsError
 from microrad.report.day import contact_run as contact_report
 from microrad.report.day import data as day_data_file
+from microrad.report.day import page as day_page_module
 from microrad.report.day import tables
 from microrad.report.day import words as day_words
 from microrad.report.day.constellation import plan_data, plan_sentences, plan_text
@@ -1820,3 +1821,18 @@ def test_the_groups_of_a_day_are_named_by_its_ways(monkeypatch):
         "day/relay",
     ]
     assert {each.attributes["epoch"] for each in arrays._day(day, None, None).values()} == {"an epoch"}
+
+
+@pytest.mark.parametrize("capacity_bit", [0.0, 1e-9])
+def test_a_day_without_any_capacity_of_the_relay_leads_its_page_as_bad(monkeypatch, capacity_bit):
+    links = SimpleNamespace(file=SimpleNamespace(sources={"a": "b"}))
+    day = SimpleNamespace(relay=SimpleNamespace(capacity_bit=capacity_bit))
+    monkeypatch.setattr(day_page_module.words, "sentences", lambda of: ["headline", "more"])
+    monkeypatch.setattr(day_page_module, "day_view", lambda *given: given)
+    monkeypatch.setattr(day_page_module, "marked", lambda views, sources: [])
+    monkeypatch.setattr("microrad.report.day.figures.day_figures", lambda of: ())
+    monkeypatch.setattr("microrad.report.page.templates.inputs_view", lambda sources: "inputs")
+    monkeypatch.setattr("microrad.report.page.templates.mission_page", lambda *given: given)
+    file, kind, (lead,), views = day_page_module.day_page(day, links)
+    assert (file, kind, views) == (links.file, "contacts", ["inputs"])
+    assert (lead.headline, lead.good) == ("headline", capacity_bit > 0.0)

@@ -12,7 +12,7 @@ import pytest
 from microrad.mission.file import MissionError, load_mission
 from microrad.mission.model import Mission
 from microrad.mission.presets import preset_text
-from microrad.mission.toml import value_of
+from microrad.mission.toml import Fault, value_of
 from microrad.studio.draft import draft as drafts
 from microrad.studio.draft import tables
 from microrad.studio.draft.draft import Draft, DraftError
@@ -906,3 +906,9 @@ def test_a_text_that_cannot_be_saved_says_why_and_what_to_do(draft, tmp_path, pl
 def test_the_lines_of_a_mirror_are_those_of_its_tables(text, mirror, there):
     assert sorted(tables._lines_of_mirror(text)) == mirror
     assert tables._tables(text) == tables._tables(text.replace("\n", "\r\n")) == there
+
+
+def test_a_key_has_each_of_its_faults(tmp_path):
+    one, two, other = (Fault(key, "1", 2, reason, "") for key, reason in (("a.b", "x"), ("a.b", "y"), ("a.c", "z")))
+    found = drafts._values("[a]\nb = 1\nc = 2\nd = 3\n", (one, other, two))
+    assert {key: value.problems for key, value in found.items()} == {"a.b": (one, two), "a.c": (other,), "a.d": ()}

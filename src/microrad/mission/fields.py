@@ -267,13 +267,13 @@ class OrWord(Quantity):
 class Several:
     """A list of at least one quantity and of at most `most`; rising lists are strictly increasing.
 
-    `shown` is an example in TOML, where a list of one item would be refused.
+    `example_list` is an example in TOML, where a list of one item would be refused.
     """
 
     each: Quantity
     rising: bool = False
     most: int = MOST_ITEMS
-    shown: str = ""
+    example_list: str = ""
 
     def read(self, value: object) -> tuple[float, ...]:
         """SI values of the list; raises `ProblemsError` with every item that does not fit."""
@@ -303,8 +303,8 @@ class Several:
     @property
     def example(self) -> str:
         """A list of one item, unless another one is shown."""
-        if self.shown:
-            return self.shown
+        if self.example_list:
+            return self.example_list
         return f'["{self.each.example}"]' if self.each.unit else f"[{self.each.example}]"
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:

@@ -128,14 +128,13 @@ class Table:
         return found
 
     def widths(self, width: int) -> list[int]:
-        """Columns of a terminal for each column, of so many for all: the longest lines of words get what is left."""
-        ranges = self._ranges()
+        """Columns of a terminal for each column, of so many: what is left goes first where the least is lacking."""
+        ranges, room = self._ranges(), width + 1 - self._least()
         found = [least for least, _ in ranges]
-        for _ in range(width + 1 - self._least()):
-            lacking = [most - has for (_, most), has in zip(ranges, found, strict=True)]
-            if max(lacking) <= 0:
-                break
-            found[lacking.index(max(lacking))] += 1
+        for place in sorted(range(len(ranges)), key=lambda k: ranges[k][1] - ranges[k][0]):
+            more = min(max(room, 0), ranges[place][1] - found[place])
+            found[place] += more
+            room -= more
         return found
 
     def parts(self, width: int) -> list["Table"]:

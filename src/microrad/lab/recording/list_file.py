@@ -165,7 +165,7 @@ def read_list(path: str | Path) -> RecordingsList:
     try:
         document = Document.read(path, "list of recordings")
     except UnreadableError as error:
-        expected = "a list of recordings, with a table [recording.NAME] for each" if path.exists() else error.expected
+        expected = "a list of recordings, with a table [recording.NAME] for each"
         fault = Fault("", "", 0, f"the list of recordings {error.reason}", expected, file=clipped(str(path)))
         raise RecordingsError(path, [fault]) from None
     except MissionError as error:

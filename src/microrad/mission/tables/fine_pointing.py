@@ -40,7 +40,7 @@ BandRms = Annotated[tuple[float, ...], Several(Quantity("rad", "urad", above=0.0
 Harmonics = Annotated[tuple[float, ...], Several(Quantity("", above=0.0, most=1e6))]
 WheelCoefficients = Annotated[tuple[float, ...], Several(Quantity("rad/Hz^2", "nrad/Hz^2", least=0.0, most=1.0))]
 _NO_COUPLING = "[1.0, 0.0, 0.0, 1.0]"
-Coupling = Annotated[tuple[float, ...], Several(Quantity("", least=-100.0, most=100.0), shown=_NO_COUPLING)]
+Coupling = Annotated[tuple[float, ...], Several(Quantity("", least=-100.0, most=100.0), example_list=_NO_COUPLING)]
 PowerOrZero = Annotated[float, Quantity("W", "pW", least=0.0, most=1e6)]
 ReceivedPower = Annotated[float, Quantity("W", "pW", above=0.0, most=1e6)]
 Convention = Annotated[
