@@ -248,6 +248,7 @@ def test_any_text_is_a_finite_number_or_a_unit_error(text, unit):
         (8.9e-5, "rad/V", "89 µrad/V"),
         (5e-14, "A/sqrt(Hz)", "0.05 pA/sqrt(Hz)"),
         (38.421, "1/V", "38.42 1/V"),
+        (0.25, "", "0.25"),
         (1e-6, "m^2", "1e-06 m^2"),  # a prefix would be squared
         (0.4, "dB", "0.4 dB"),
         (290.6, "photon/bit", "290.6 photon/bit"),

@@ -1390,6 +1390,7 @@ def test_a_drive_of_sixty_hertz_about_six_volts_is_told_in_volts():
     t = np.arange(400) / 2000.0
     recording = ns(drive=(3.0 + 2.5 * np.sin(2 * np.pi * 60.0 * t))[:, None], rate_hz=2000.0)
     assert words.drive_text(recording, 2.0) == "60 Hz, ± 5 V about 6 V"
+    assert words.drive_text(ns(drive=recording.drive, rate_hz=66666.7), 2.0) == "2 kHz, ± 5 V about 6 V"
 
 
 @pytest.mark.parametrize(
@@ -1406,3 +1407,15 @@ def test_a_drive_is_a_sine_from_two_periods_on_wherever_it_is_centred(freq_hz, s
     sine = words.sine_of(7.0 - size * np.sin(2 * np.pi * freq_hz * time), 1000.0)
     assert (sine and (sine.freq_hz, sine.amplitude_v)) == (found and pytest.approx(found, rel=1e-5))
     assert words.sine_of(7.0 + np.where(time % 0.1 < 0.03, size, 0.0), 1000.0) is None
+
+
+def test_large_frequencies_and_errors_are_told_without_powers_of_ten():
+    linear = ns(excited_hz=(1000.0, 5000.0), dc_gain=np.eye(1), dc_gain_error=np.eye(1), edge_gain=np.eye(1))
+    linear.edge_gain_error = np.eye(1)
+    found = ns(linear=linear, drive_min_v=0.0, drive_max_v=1.0, rate_limit_v_per_s=12346.0 * math.pi, fit=lambda: None)
+    assert words._band(found) == "The linear part was excited from 1 kHz to 5 kHz, but the model does not use it."
+    assert words.range_text(found).endswith("which a sine over that range reaches at 12.35 kHz.")
+    assert [each[0] for each in words.gains(linear)] == ["zero frequency", "1 kHz"]
+    assert words.error_text(ns(held_out_rms_percent=12.34), 10e-3) == "1230 µrad rms (12.3 %)"
+    worst = words.worst_text(ns(worst="a.csv", worst_rms_rad=1.234e-3, worst_peak_rad=9.9996e-3), 10e-3)
+    assert worst.endswith("a.csv, with 1230 µrad rms (12.3 %) and 10000 µrad at most.")

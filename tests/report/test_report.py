@@ -751,6 +751,7 @@ def test_a_cost_without_a_data_rate_is_said_in_decibels_alone():
     cost = Cost("sine of 25 Hz", "PID", "given", -1.5, math.nan)
     assert words._rate_lost(cost) == ""
     assert words._rate_lost(replace(cost, data_rate_bit_s=-252.4e6)) == " or 252 Mbit/s"
+    assert words._rate_lost(replace(cost, data_rate_bit_s=-0.3e6)) == " or 300 kbit/s"
 
 
 @pytest.mark.parametrize(("finding", "reading"), [(False, False), (True, False), (False, True), (True, True)])
@@ -1090,3 +1091,54 @@ def test_other_readings_stand_below_the_missions_own_with_what_they_turn(monkeyp
     ]
     study.other_readings = [of("e.f", "x", "y", math.nan, math.nan, "it does not run")]
     assert words.read_otherwise(study) == []
+
+
+def test_hysteresis_costs_what_it_costs_however_little():
+    costs = [Cost("sine of 25 Hz", "PID", "given", -0.0034, -0.3e6)]
+    study = ns(
+        residual=ns(freq_hz=25.0, controller="PID"), fine_pointing=None, performance=ns(costs=costs, outage=0.003)
+    )
+    assert words.hysteresis_cost(study).startswith(
+        "Hysteresis costs the link 0.003 dB or 300 kbit/s with PID (sine of 25 Hz), at"
+    )
+
+
+@pytest.mark.parametrize(
+    ("fastest", "span", "told"),
+    [
+        (3772.0, (-6.0, 6.0), "3.772 kV/s (identified up to 3.77 kV/s)"),
+        (150.0, (-6.0, 6.004), "0 to 12.004 V (identified from 0 to 12 V)"),
+        (150.0, (-7.5, 3.0), "−1.5 to 9 V (identified from 0 to 12 V)"),
+        (3770.0, (-6.0, 6.0), ""),
+    ],
+)
+def test_a_drive_is_told_apart_from_what_the_mirror_was_identified_for(fastest, span, told):
+    mirror = ns(rate_limit_v_s=3770.0, bias_v=6.0, drive_min_v=0.0, drive_max_v=12.0)
+    run = ns(fastest_drive_v_s=fastest, drive_span_v=span, mirror=None, trace=ns(name="a run"))
+    said = words.beyond_identified(ns(file=ns(mission=ns(mirror=mirror))), run)
+    assert said == (f"a run: the mirror model is extrapolated to a drive of {told}" if told else "")
+
+
+@pytest.mark.parametrize(("count", "s"), [(1, ""), (2, "s")])
+def test_what_is_counted_has_its_number(monkeypatch, count, s):
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: "")
+    counts = ns(clamped=count, inverse_clamped=0, saturated=count, slew_limited=count, alternating=count)
+    assert words._of_runs(ns(runs=[ns(trace=ns(name="a", counts=counts))])) == [
+        f"a: {count} step{s} beyond the identified rate",
+        f"a: {count} saturated sample{s}",
+        f"a: {count} slew-limited step{s}",
+        f"a: {count} reversal{s} of the command within 10 samples of the last",
+    ]
+    m = ns(
+        mirror=ns(bias_v=6.0, drive_min_v=0.0, drive_max_v=12.0),
+        scenario=ns(loop_amplitude_v=1.0),
+        amplifier=ns(output_min_v=0.0, gain=10.0, output_max_v=120.0),
+    )
+    said = words._of_loops(ns(file=ns(mission=m), loops=[ns(freq_hz=5.0, clamped=count)]))
+    assert said == [f"hysteresis loop at 5 Hz: {count} sample{s} beyond the identified rate"]
+    monkeypatch.setattr(chain, "_with_stroke", lambda study, lines: lines)
+    mirror = ns(name="m", actuators=count, axes=count, A=np.eye(4))
+    of = chain_study(fine_pointing=ns(scene=ns(loop=ns(mirror=mirror))))
+    of.day.relay.contacts = range(count)
+    assert chain._orbit(of).lines[0] == f"{count} contact{s} in 36 h"
+    assert chain._mirror(of)[1] == f"{count} actuator{s}, {count} output{s}"

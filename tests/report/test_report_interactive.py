@@ -407,6 +407,8 @@ def test_six_decades_have_ticks_between_and_more_have_none():
         (1.0, 1e4, 2, [1.0, 1e3]),
         (1.0, 1e3, 4, [1.0, 10.0, 100.0, 1e3]),
         (1.0, 1e3, 3, [1.0, 100.0]),
+        (10.0, 1e3, 2, [10.0, 1e3]),  # one alone would tell no scale
+        (10.0, 1e5, 2, [10.0, 1e5]),
     ],
 )
 def test_ticks_of_a_logarithmic_axis_take_its_ends_and_are_no_more_than_there_may_be(low, high, most, found):
@@ -753,7 +755,7 @@ def test_rings_of_two_points_are_no_area():
 def test_words_that_stand_nowhere_are_not_drawn():
     sheet = one(Line(X + 1.0, Y), Words("lost", math.nan, 4.0), Words("there", 1.0, math.nan), Words("", 1.0, 4.0))
     assert not {"lost", "there"} & set(texts(sheet))
-    assert len(turned(sheet)["layout"]["annotations"]) == 2
+    assert not turned(sheet)["layout"]["annotations"]
 
 
 def test_a_marked_curve_is_one_trace_unless_it_has_fewer_markers_than_points():
@@ -1658,6 +1660,7 @@ def test_round_ticks_as_they_are_written(low, high, most, found):
         (False, "x", (0.0, 1.0), 90.0, "0 1"),
         (False, "x", (36000.001, 36000.009), 300.0, "36000.002 36000.004 36000.006 36000.008"),
         (False, "x", (-5000.0, 5000.0), 150.0, "−5000 0 5000"),
+        (False, "x", (5000.0, -5000.0), 150.0, "−5000 0 5000"),
         (False, "x", (1e-4, 9e-4), 160.0, "2.5×10⁻⁴ 5×10⁻⁴ 7.5×10⁻⁴"),  # one tick less is enough
         (False, "x", (36000.01, 36000.09), 180.0, "36000.025 36000.050 36000.075"),
         (False, "y", (5000.0, -5000.0), 70.0, "−5000 0 5000"),
@@ -1909,6 +1912,7 @@ def test_an_area_and_stairs_of_unlike_values():
             "a long name of an assumption\n of two lines / the other",
             ["a long name of an assumption of two lines /", "the other"],
         ),
+        (f"{'word ' * 8}four / the other", [" ".join(["word"] * 8), "four /", "the other"]),  # no stroke of its own
     ],
 )
 def test_a_label_is_broken_behind_the_assumption_and_between_its_values(label, lines):
@@ -1960,3 +1964,27 @@ def test_a_figure_of_an_odd_name_has_an_id_and_a_title_that_are_sound():
     assert (bool(figure.plot), figure.static.plot, figure.static.title) == (True, "", figure.title)
     figure.take("<svg other", "{}")
     assert (figure.svg, figure.plot) == ("<svg other", "{}")
+
+
+def test_what_stands_at_no_place_of_an_axis_is_in_neither_form():
+    lost = Words("below", 1.0, -1.0), Words("at none", 1.0, 0.0), Words("nowhere", math.nan, 4.0)
+    spans = [Span(math.nan, 4.0, upright, SKY) for upright in (False, True)]
+    sheet = one(Line(X, Y), Words("there", 1.0, 4.0), Words("beside", 1.0, -1.0, of_panel="y"), *lost, *spans)
+    sheet.panels[0].y.log = True
+    plot = turned(sheet)["layout"]
+    assert [each["text"] for each in plot["annotations"]] == ["there", "beside"] and not plot["shapes"]
+    assert not [each for each in parts(sheet, "rect") if each.get("fill") == SKY]
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_a_legend_without_a_place_keeps_clear_of_bars(upright):
+    at, none = np.array([3.0, 4.0]), np.zeros(2)
+    sheet = one(Bars(at, none, np.array([1.0, 1.0]), np.ones(2), BLUE, label="bars", upright=upright))
+    sheet.panels[0].legend = Legend()
+    for which in ("x", "y"):
+        axis = getattr(sheet.panels[0], which)
+        axis.low, axis.high = (0.0, 4.5) if (which == "x") is upright else (0.0, 1.02)
+    found = layout(sheet)
+    (key,), (placed,) = found.keys, found.placed
+    left, top, right, bottom = placed.inner
+    assert (key.x < (left + right) / 2.0) if upright else (key.y > (top + bottom) / 2.0)

@@ -270,7 +270,7 @@ def test_the_penalty_is_said_with_a_code_and_without_however_rare_the_fades(plai
         said = links_words.under_jitter_sentence(c, plain)
         coded = "with a code 0.41 dB where its interleaver spans many fades, 2.46 dB where it spans none; "
         assert said.endswith(coded + words)
-        assert not re.search(r"\b(nan|inf)\b", said)
+        assert not re.search(r"\b(nan|inf)\b|  ", said)
         data = performance_data(c)
         assert (data["coded_penalty_many_fades_db"], data["coded_penalty_no_interleaver_db"]) == (0.414, 2.456)
 

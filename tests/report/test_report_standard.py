@@ -201,7 +201,7 @@ def test_each_kind_of_requirement_is_told_with_where_it_is_asked():
     said, table, _ = shown.standard_view(odd).blocks
     assert said.startswith(
         "Of 8 requirements that public sources print of it, up to version 4.0, 3 are met and 2 are not; the mission "
-        "does not say 2, and 1 "
+        "does not say 2, and 1 is outside microrad."
     )
     assert [[str(cell) for cell in row] for row in table.rows[1:3]] == [
         [

@@ -285,6 +285,8 @@ def test_the_distances_of_each_kind_follow_from_steps_runs_and_draws(kind, relat
         ("day.sky.correlation[0][1]", "formula", ""),
         ("day.direct.contacts_s", None, "s"),
         ("xday.duration_s", None, "s"),
+        ("implied_sensitivity_photon_bit[1]", "formula", "photon/bit"),
+        ("x.acceleration_rad_s2", None, "rad/s^2"),
     ],
 )
 def test_a_number_has_the_kind_and_the_unit_of_its_place(place, kind, unit):

@@ -2472,6 +2472,7 @@ def test_the_evidence_holds_for_a_mission_of_which_no_two_values_are_alike(stran
         ),
         *(("a.doppler_most_hz", "Hz"), ("a.least_v", "V"), ("a.rms_percent", "%"), ("a.slope_v_per_rad", "V/rad")),
         *(("a.cost_db_per_w", "dB/W"), ("a.least_m.0", "m"), ("loss_db.x", "dB"), ("db", ""), ("rad.x", ""), ("s", "")),
+        *(("identify.rate_limit_v_s", "V/s"), ("a.dc_gain_rad_v", "rad/V")),
         *(("a.turns_per_s", "1/s"), ("seconds_off", "s"), ("a_s.seconds_off.b_m", "m"), ("a_m.b.c", "")),
     ],
 )
@@ -2594,12 +2595,17 @@ def test_every_occurrence_of_an_installation_in_which_all_goes_wrong():
         ("h", "Defects are known here by comparisons that fail."),
     ):
         assert [1 for of, text in said if of == letter and text.startswith(begins)] == [1], (letter, begins)
+    bare = next(each for each in unlike().standings if each.status is Status.NONE)
+    for count, begins in ((1, "1 quantity was"), (2, "2 quantities were")):
+        several = warned.warnings(replace(unlike(), standings=(bare,) * count))
+        assert [w.found.partition(" compared")[0] for w in several if "with nothing" in w.found] == [begins]
 
 
 @pytest.mark.parametrize(
     ("counts", "holds", "whole", "measured", "published", "levels", "said"),
     [
         ((3, 4, 2, 1), True, True, 5, 6, (1, 1, 1, 0, 2), "7 of 10 printed"),
+        ((3, 4, 0, 1), True, True, 5, 6, (1, 1, 1, 0, 2), "7 of 8 printed"),
         ((3, 4, 0, 0), True, True, 0, 6, (1, 2, 1, 0, 2), "7 of 7 printed"),
         ((3, 4, 0, 0), True, False, 0, 0, (1, 1, 0, 0, 2), "7 of 7 printed"),
         ((3, 4, 0, 0), False, True, 5, 6, (1, 0, 0, 0, 2), "7 of 7 printed"),
@@ -2615,7 +2621,8 @@ def test_the_capability_has_its_five_levels_and_counts(counts, holds, whole, mea
         for f in argued["Verification"].__slots__
         if "printed" in str(getattr(argued["Verification"], f))
     )
-    assert rationale.startswith(said) and f"{sum(counts) - counts[0] - counts[1]} are not." in rationale
+    left = sum(counts) - counts[0] - counts[1]
+    assert rationale.startswith(said) and f"; {left} {'is' if left == 1 else 'are'} not." in rationale
     assert ("Some of that evidence failed." in rationale) is not holds
     assert ("not the recorded ones" in rationale) is not whole
     assert any(

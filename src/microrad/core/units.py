@@ -315,13 +315,13 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
 
     Args:
         value: The value in the SI unit.
-        unit: The SI unit.
+        unit: The SI unit; "" for a share.
         digits: Significant digits.
     """
     rounded = float(f"{value:.{digits}g}")
     prefix = _prefix(abs(rounded), re.split("[ /]", unit, maxsplit=1)[0])
     scaled = value / float(_PREFIXES[prefix]) if prefix else value
-    return f"{float(f'{scaled:.{digits}g}'):.15g} {prefix}{unit}"
+    return f"{float(f'{scaled:.{digits}g}'):.15g} {prefix}{unit}".rstrip()
 
 
 def format_input(value: float, unit: str) -> str:

@@ -9,6 +9,7 @@ from microrad.link.radial_error import SMALLEST_PROBABILITY
 MINUS = "\u2212"
 """The sign in front of a negative number, which is no hyphen."""
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_LESS = ("< 0.001", f"> {MINUS}0.001")  # above none, and below
 _NOTHING_DB = 1e-9  # what rounding leaves of a margin that is none
 
 
@@ -69,6 +70,16 @@ def minus(text: str) -> str:
     return re.sub(r"(?<![\w.])-(?=\d|inf)", MINUS, text)
 
 
+def plain(value: float, digits: int = 3) -> str:
+    """A number without a power of ten, however large.
+
+    Args:
+        value: any.
+        digits: significant ones.
+    """
+    return minus(f"{float(f'{value:.{digits}g}'):.15g}")
+
+
 def power_text(number: float, digits: int = 3) -> str:
     """A number with its power of ten, as it is printed in books: 3×10⁻⁴.
 
@@ -93,13 +104,14 @@ def micro(value_rad: float) -> str:
     if value == 0.0 or abs(value) >= 99.95:
         return minus(f"{value:.0f}")
     if abs(value) < 1e-3:
-        return "< 0.001"
-    return minus(f"{value:.{min(3, max(0, 2 - math.floor(math.log10(abs(value)))))}f}")
+        return _LESS[int(value < 0.0)]
+    size = float(f"{abs(value):.3g}")  # rounding may gain a digit
+    return minus(f"{value:.{min(3, max(0, 2 - math.floor(math.log10(size))))}f}")
 
 
 def angle(value_rad: float) -> str:
     """An angle as it was found: in microradians with the digits of the tables, from 1 mrad on in larger units."""
-    return f"{micro(value_rad)} µrad" if abs(value_rad) < 1e-3 else format_quantity(value_rad, "rad", 3)
+    return f"{micro(value_rad)} µrad" if float(f"{abs(value_rad):.3g}") < 1e-3 else format_quantity(value_rad, "rad", 3)
 
 
 def given_angle(value_rad: float) -> str:
@@ -117,8 +129,8 @@ def percent(share: float, digits: int = 2) -> str:
     """
     value = 100.0 * share
     if 0.0 < abs(value) < 1e-3:
-        return "< 0.001 %"
-    return minus(f"{float(f'{value:.{digits}g}'):.15g} %")
+        return f"{_LESS[int(value < 0.0)]} %"
+    return f"{plain(value, digits)} %"
 
 
 def share_of_time(quantile: float) -> str:
@@ -137,8 +149,8 @@ def duration(time_s: float) -> str:
         return "never"
     for unit_s, unit in ((3600.0, "h"), (60.0, "min")):
         if abs(time_s) >= 2.0 * unit_s:
-            return f"{time_s / unit_s:.3g} {unit}"
-    return f"{time_s:.3g} s"
+            return f"{plain(time_s / unit_s)} {unit}"
+    return f"{plain(time_s)} s"
 
 
 def counted(number: int, noun: str) -> str:
@@ -149,3 +161,8 @@ def counted(number: int, noun: str) -> str:
         noun: in the singular.
     """
     return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def are(number: int) -> str:
+    """The verb behind a number of things: "1 is", "2 are"."""
+    return "is" if number == 1 else "are"

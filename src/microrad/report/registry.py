@@ -115,6 +115,10 @@ def unregistered(names: Iterable[str]) -> list[str]:
 
 _UNITS = {"db": "dB", "rad": "rad", "s": "s", "hz": "Hz", "m": "m", "w": "W", "bit": "bit", "v": "V", "percent": "%"}
 _PER = {**_UNITS, "photons": "photon"}
+_PAIRS = {
+    **{"m_s": "m/s", "bit_s": "bit/s", "rad_s": "rad/s", "rad_s2": "rad/s^2", "w_m2": "W/m^2", "w_sr": "W/sr"},
+    **{"v_s": "V/s", "rad_v": "rad/V"},
+}
 
 
 def unit_of(name: str) -> str:
@@ -126,8 +130,7 @@ def unit_of(name: str) -> str:
 def _said_unit(part: str) -> str:
     """The unit that a key ends with, as in "rate_bit_s" or "fades_per_s"."""
     words = part.split("_")
-    pairs = {"m_s": "m/s", "bit_s": "bit/s", "rad_s": "rad/s", "rad_s2": "rad/s^2", "w_m2": "W/m^2", "w_sr": "W/sr"}
-    if pair := pairs.get("_".join(words[-2:])):
+    if pair := _PAIRS.get("_".join(words[-2:])):
         return pair
     if words[0] == "seconds":
         return "s"

@@ -310,7 +310,7 @@ class Receiver(Table):
             return
         most = phase_error.largest_rms_rad(self.bit_error_ratio, quadratures)
         limit = format_quantity(most * (1.0 - 1e-3), "rad")
-        ratio = format_quantity(self.bit_error_ratio, "").rstrip()
+        ratio = format_quantity(self.bit_error_ratio, "")
         reason = f'leaves no power that reaches bit_error_ratio = {ratio} with modulation = "{self.modulation}"'
         yield Problem("phase_error", reason, f'at most "{limit}" rms, or another bit_error_ratio')
 
@@ -444,7 +444,7 @@ class Communication(Beam):
         limit_db = 10.0 * math.log10(receiver.most_code_gain(self.data_rate_bit_s, self.wavelength_m))
         if receiver.code_gain_db > limit_db:
             at = f"code_rate = {receiver.rate_of_code:g}"
-            ratio = format_quantity(receiver.bit_error_ratio, "").rstrip()
+            ratio = format_quantity(receiver.bit_error_ratio, "")
             reason = (
                 f"is more than any code can gain: {limit_db:.3g} dB at {at} and bit_error_ratio = {ratio}, where "
                 f"{receiver.modulation} with {receiver.detector} is at its capacity"

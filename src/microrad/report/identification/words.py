@@ -18,6 +18,7 @@ from microrad.report.identification.parameters import (
     admissible,
     starts_text,
 )
+from microrad.report.quantities import plain
 
 PAPER_MODEL = "bouc_wen"  # Eq. 3 of SPIE 11852, 118523B
 _SINE_POWER = 0.8  # in the strongest line of a drive and its neighbours
@@ -65,7 +66,8 @@ def drive_text(recording: Recording, volts: float) -> str:
     sine = sine_of(drive, recording.rate_hz)
     half = float(np.ptp(drive)) / 2
     middle = _rounded(float(drive.max() + drive.min()) / 2, half)
-    return f"{'many frequencies' if sine is None else f'{sine.freq_hz:.3g} Hz'}, ± {half:.3g} V about {middle:.3g} V"
+    kind = "many frequencies" if sine is None else format_quantity(sine.freq_hz, "Hz", 3)
+    return f"{kind}, ± {half:.3g} V about {middle:.3g} V"
 
 
 def _rounded(value: float, span: float) -> float:
@@ -83,7 +85,7 @@ def error_text(score: Score, span_rad: float) -> str:
         span_rad: largest peak-to-peak output, rad.
     """
     rms = score.held_out_rms_percent
-    return f"{rms * span_rad * 1e4:.3g} µrad rms ({rms:.3g} %)"
+    return f"{plain(rms * span_rad * 1e4)} µrad rms ({plain(rms)} %)"
 
 
 def full_range_hz(found: Identification) -> float:
@@ -107,8 +109,8 @@ def verdict(found: Identification, written: str | None = None) -> list[str]:
     own, fit, rests = found.score(), found.fit(), evidence(found.recordings, chosen_predictions(found))
     headline = (
         f"{found.chosen} predicts samples that no fit has seen with an error of "
-        f"{error_text(own, found.span_rad)}, {own.held_out_peak_percent * found.span_rad * 1e4:.3g} µrad at most, over "
-        f"{rests.text}."
+        f"{error_text(own, found.span_rad)}, {plain(own.held_out_peak_percent * found.span_rad * 1e4)} µrad at most, "
+        f"over {rests.text}."
     )
     sentences = [
         headline,
@@ -148,8 +150,8 @@ def worst_text(rests: Evidence, span_rad: float) -> str:
     """
     rms, share = 1e6 * rests.worst_rms_rad, 100 * rests.worst_rms_rad / span_rad
     return (
-        f"The worst of all recordings, fitted or not, is {rests.worst}, with {rms:.3g} µrad rms ({share:.3g} %) and "
-        f"{1e6 * rests.worst_peak_rad:.3g} µrad at most."
+        f"The worst of all recordings, fitted or not, is {rests.worst}, with {plain(rms)} µrad rms ({plain(share)} %) "
+        f"and {plain(1e6 * rests.worst_peak_rad)} µrad at most."
     )
 
 
@@ -159,7 +161,7 @@ def range_text(found: Identification) -> str:
     return (
         f"It holds for drives from {low} to {high} and rates up to "
         f"{format_quantity(found.rate_limit_v_per_s, 'V/s', 4)}, which a sine over that range reaches at "
-        f"{full_range_hz(found):.4g} Hz."
+        f"{format_quantity(full_range_hz(found), 'Hz')}."
     )
 
 
@@ -186,7 +188,7 @@ def _against(found: Identification) -> str:
 
 def _times(score: Score, found: Identification) -> str:
     own = found.score().held_out_rms_percent
-    ratio = f", {score.held_out_rms_percent / own:.3g} times as much" if own > 0.0 else ""
+    ratio = f", {plain(score.held_out_rms_percent / own)} times as much" if own > 0.0 else ""
     return f"{error_text(score, found.span_rad)}{ratio}"
 
 
@@ -210,7 +212,7 @@ def _band(found: Identification) -> str:
     if found.linear is None:
         return "There is no linear part: its dynamics are not known from these recordings."
     low, high = found.linear.excited_hz
-    return f"The linear part was excited from {low:.3g} Hz to {format_quantity(high, 'Hz', 3)}" + (
+    return f"The linear part was excited from {format_quantity(low, 'Hz', 3)} to {format_quantity(high, 'Hz', 3)}" + (
         "." if _has_linear(found.fit()) else ", but the model does not use it."
     )
 
@@ -311,7 +313,11 @@ def gains(linear: LinearFit | None) -> list[tuple[str, float, float]]:
         return []
     return [
         ("zero frequency", float(linear.dc_gain[0, 0]), float(linear.dc_gain_error[0, 0])),
-        (f"{linear.excited_hz[0]:.3g} Hz", float(linear.edge_gain[0, 0]), float(linear.edge_gain_error[0, 0])),
+        (
+            format_quantity(linear.excited_hz[0], "Hz", 3),
+            float(linear.edge_gain[0, 0]),
+            float(linear.edge_gain_error[0, 0]),
+        ),
     ]
 
 

@@ -96,7 +96,7 @@ def _lost(shown: Sequence[Swing], margin_db: float) -> float:
 
 def _label(swing: Swing) -> str:
     key = swing.key.removeprefix("communication.")
-    return f"{key} = {format_quantity(swing.value, swing.unit, 3)}".rstrip()
+    return f"{key} = {format_quantity(swing.value, swing.unit, 3)}"
 
 
 def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any, get_args
 
 from microrad.link.compliance import Asked, Compliance, Held, Judgement
-from microrad.report.quantities import apart, quantity
+from microrad.report.quantities import apart, are, quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Soft, View
 
@@ -39,7 +39,8 @@ def summary(found: Compliance) -> str:
     left, outside = found.count("not said"), found.count("outside microrad")
     return (
         f"Of {len(found.held)} requirements that public sources print of it, up to version {found.standard.version}, "
-        f"{met} are met and {missed} are not; the mission does not say {left}, and {outside} are outside microrad."
+        f"{met} {are(met)} met and {missed} {are(missed)} not; the mission does not say {left}, and {outside} "
+        f"{are(outside)} outside microrad."
     )
 
 
@@ -58,7 +59,7 @@ def number_text(asked: Asked) -> str:
 def _texts(held: Held) -> tuple[str, str]:
     """What is asked, and what the mission has of it; a bound has as many digits as tell the two apart."""
     asked = held.asked
-    has = held.text or (_NOTHING if held.value is None else quantity(held.value, asked.unit).rstrip())
+    has = held.text or (_NOTHING if held.value is None else quantity(held.value, asked.unit))
     limits = [quantity(each, asked.unit, 4) for each in asked.values] if asked.unit else [*asked.texts]
     match asked.comparison:
         case None:

@@ -251,13 +251,15 @@ class Pen:
         self.to.turned.append(Turned("data", len(self.to.data) - 1, self.number, label, look))
 
     def shape(self, made: dict[str, Any], label: str, look: Look) -> None:
-        """Add a shape.
+        """Add a shape, unless one of its places is none.
 
         Args:
             made: plotly's shape.
             label: what a legend calls it, or "".
             look: what a reader tells it by.
         """
+        if None in made.values():
+            return
         self.to.shapes.append(made)
         self.to.turned.append(Turned("shapes", len(self.to.shapes) - 1, self.number, label, look))
 
@@ -468,13 +470,14 @@ def _words(pen: Pen, text: Words) -> None:
         ("y", text.y, pen.of.panel.y, pen.y, text.shift[1]),
     ):
         free = which in text.of_panel
-        made[which] = numbers([math.log10(value) if axis.log and not free else value])[0]
+        at = value if free or not axis.log else math.log10(value) if value > 0.0 else math.nan
+        made[which] = numbers([at])[0]
         made[f"{which}ref"] = f"{name} domain" if free else name
         made[f"{which}shift"] = _pixels(shift)
     made |= {"xanchor": {"start": "left", "middle": "center", "end": "right"}[text.anchor], "yanchor": text.base}
     if text.box:
         made["bgcolor"] = clear(WHITE, 0.75)
-    if text.text:
+    if text.text and None not in (made["x"], made["y"]):
         pen.to.annotations.append(made)
 
 

@@ -193,13 +193,28 @@ def _place(key: Key, placed: Sequence[Placed]) -> None:
 
 
 def _covered(of: Placed, key: Key, x: float, y: float) -> int:
-    """How many points of curves and ends of bars lie under a legend there."""
+    """How many points of curves, and how many bars, lie under a legend there."""
     count = 0
     for mark in of.panel.marks:
         if isinstance(mark, Line) and mark.x.size:
             a, b = at(of, mark.x, mark.y)
             count += int(np.sum((a > x) & (a < x + key.width) & (b > y) & (b < y + key.height)))
+        elif isinstance(mark, Bars):
+            (a, c), (b, d) = (np.sort(pair, axis=0) for pair in corners(of, mark))
+            count += int(np.sum((c > x) & (a < x + key.width) & (d > y) & (b < y + key.height)))
     return count
+
+
+def corners(of: Placed, bars: Bars) -> tuple[np.ndarray, np.ndarray]:
+    """Places of two opposite corners of bars, across and down, (2, n) each.
+
+    Args:
+        of: the panel in its place.
+        bars: drawn in it.
+    """
+    half = bars.breadth / 2.0
+    along, across = np.stack([bars.start, bars.end]), np.stack([bars.at - half, bars.at + half])
+    return at(of, across, along) if bars.upright else at(of, along, across)
 
 
 def at(of: Placed, x: object, y: object) -> tuple[np.ndarray, np.ndarray]:

@@ -178,7 +178,7 @@ def ticks(axis: Axis, which: str, ends: tuple[float, float], length: float) -> d
 def _apart(axis: Axis, found: dict[float, str], ends: tuple[float, float], length: float) -> bool:
     """Whether the texts below an axis stand apart."""
     at = [(float(place(axis, each, ends)) * length, width_of(text, axis.size)) for each, text in found.items()]
-    return all(b - a > (wa + wb) / 2.0 + _LEAST_GAP for (a, wa), (b, wb) in itertools.pairwise(at))
+    return all(abs(b - a) > (wa + wb) / 2.0 + _LEAST_GAP for (a, wa), (b, wb) in itertools.pairwise(at))
 
 
 def rounds(low: float, high: float, most: int) -> list[float]:
@@ -211,7 +211,8 @@ def decades(low: float, high: float, most: int) -> list[float]:
     whole = [power for power in range(first, last + 1) if low * (1 - 1e-9) <= 10.0**power <= high * (1 + 1e-9)]
     if len(whole) >= 3:
         step = math.ceil(len(whole) / most)
-        return [10.0**power for power in whole if power % step == 0]
+        at = [10.0**power for power in whole if power % step == 0]
+        return at if len(at) >= min(most, 2) else [10.0 ** whole[0], 10.0 ** whole[-1]]  # one alone tells no scale
     for steps in ((1, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,)):
         at = [float(f"{k * 10.0**power:.3g}") for power in range(first - 1, last + 1) for k in steps]
         at = [each for each in at if low * (1 - 1e-9) <= each <= high * (1 + 1e-9)]

@@ -23,6 +23,7 @@ from microrad.report.plotting.layout import (
     Layout,
     Placed,
     at,
+    corners,
     layout,
 )
 from microrad.report.plotting.palette import BLACK, WHITE, colour_at, thinned
@@ -249,6 +250,8 @@ def _rule(of: Placed, rule: Rule) -> list[str]:
 def _span(of: Placed, span: Span) -> list[str]:
     left, top, right, bottom = of.inner
     a, b = sorted(_along(of, of.within(span), span.upright))
+    if not np.isfinite([a, b]).all():
+        return []
     box = (a, top, b, bottom) if span.upright else (left, a, right, b)
     return [f'<rect {_rect(box)} fill="{span.colour}" fill-opacity="{span.opacity:g}"/>']
 
@@ -266,12 +269,7 @@ def _area(of: Placed, area: Area) -> list[str]:
 
 
 def _bars(of: Placed, bars: Bars) -> list[str]:
-    half = bars.breadth / 2.0
-    along = bars.start, bars.end
-    across = bars.at - half, bars.at + half
-    (a, b), (c, d) = (
-        at(of, *pair) for pair in (zip(across, along, strict=True) if bars.upright else zip(along, across, strict=True))
-    )
+    (a, c), (b, d) = corners(of, bars)
     known = np.isfinite(a) & np.isfinite(b) & np.isfinite(c) & np.isfinite(d)
     path = "".join(
         f"M{p:.2f} {q:.2f}H{r:.2f}V{s:.2f}H{p:.2f}Z" for p, q, r, s in np.stack([a, b, c, d], axis=1)[known].tolist()

@@ -11,6 +11,7 @@ from microrad.report.plotting.sheet import Area, Bars, Legend, Panel, Place, Rul
 
 _LINE = 44  # characters
 _MOST_LABEL = 1000
+_KEPT = "\u00a0"  # a blank at which no line is broken
 
 
 def in_lines(label: str) -> str:
@@ -19,8 +20,8 @@ def in_lines(label: str) -> str:
     for mark in (": ", " / "):
         head, found, tail = lines[-1].partition(mark)
         if found and len(lines[-1]) > _LINE:
-            lines[-1:] = [head + mark.rstrip(), tail]
-    return "\n".join(textwrap.fill(line, _LINE, max_lines=2, placeholder="…") for line in lines)
+            lines[-1:] = [head + mark.rstrip().replace(" ", _KEPT), tail]
+    return "\n".join(textwrap.fill(line, _LINE, max_lines=2, placeholder="…") for line in lines).replace(_KEPT, " ")
 
 
 def swing_bars(panel: Panel, labels: Sequence[str], ends: Sequence[tuple[float, float]], value: float) -> None:

@@ -285,7 +285,7 @@ def _pattern(text: str) -> re.Pattern[str]:
 
 
 # ---------------------------------------------------------------------------------------------------------------- units
-_ENDING = re.compile(r"_(rad_s2|rad_s|m_s|bit_s|rad|db|hz|bit|m|s)$")
+_ENDING = re.compile(r"_(photon_bit|rad_s2|rad_s|m_s|bit_s|rad|db|hz|bit|m|s)$")
 
 
 def unit_of(place: str) -> str:
@@ -293,5 +293,5 @@ def unit_of(place: str) -> str:
     for key in reversed(re.sub(r"\[\d+\]", "", place).split(".")):
         if found := _ENDING.search(key):
             unit = found[1]
-            return {"db": "dB", "hz": "Hz"}.get(unit, "/".join(unit.rsplit("_", 1)))
+            return {"db": "dB", "hz": "Hz", "rad_s2": "rad/s^2"}.get(unit, "/".join(unit.rsplit("_", 1)))
     return ""

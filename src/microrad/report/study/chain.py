@@ -9,7 +9,7 @@ from microrad.loop.controller_study import Scene
 from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.marks import with_sign
-from microrad.report.quantities import micro, quantity, share_of_time, signed, volume
+from microrad.report.quantities import counted, micro, quantity, share_of_time, signed, volume
 from microrad.report.study.contributors import worst_axis
 from microrad.study.study import Study
 
@@ -51,7 +51,7 @@ def _orbit(study: Study) -> Stage:
     lines = [f"{quantity(m.range_m(m.communication), 'm')} as budgeted"]
     if day is not None:
         reach = max((e.range_most_m for e in day.encounters), default=math.nan)
-        lines = [f"{len(day.relay.contacts)} contacts in {day.view.days * 24:.4g} h"]
+        lines = [f"{counted(len(day.relay.contacts), 'contact')} in {day.view.days * 24:.4g} h"]
         lines.append(f"{day.relay.contact_s / 60:.0f} min in view of the {day.view.partner}")
         far = "" if math.isnan(reach) else f", up to {quantity(reach, 'm')}"
         lines.append(f"{quantity(m.range_m(m.communication), 'm')}{far}")
@@ -101,7 +101,11 @@ def _mirror(study: Study) -> Stage:
     m, fine = study.file.mission, study.fine_pointing
     if fine is not None and not isinstance(fine.scene, Scene):
         of = fine.scene.loop.mirror
-        lines = [of.name, f"{of.actuators} actuators, {of.axes} outputs", f"{of.A.shape[0]} states"]
+        lines = [
+            of.name,
+            f"{counted(of.actuators, 'actuator')}, {counted(of.axes, 'output')}",
+            f"{of.A.shape[0]} states",
+        ]
         return _with_stroke(study, lines)
     widths = [100.0 * loop.width for loop in study.loops]
     half = (m.amplifier.output_max_v - m.amplifier.output_min_v) / m.amplifier.gain / 2.0

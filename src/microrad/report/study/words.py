@@ -18,7 +18,7 @@ from microrad.report.day import words as day_words
 from microrad.report.fine_pointing import words as fine_pointing_words
 from microrad.report.foundation import placards
 from microrad.report.marks import marked, with_sign
-from microrad.report.quantities import angle, minus, quantity, signed
+from microrad.report.quantities import MINUS, angle, apart, counted, minus, quantity, signed
 from microrad.report.requirements import (
     derived_words,
     first_warning,
@@ -252,7 +252,7 @@ def hysteresis_cost(study: Study) -> str:
     if study.fine_pointing is not None:
         named.append((FINE, study.fine_pointing.best.design.name))
     said = [
-        f"{-c.margin_db:.2f} dB{_rate_lost(c)} with {c.controller} ({c.source})"
+        f"{quantity(c.margin_db, 'dB').removeprefix(MINUS)}{_rate_lost(c)} with {c.controller} ({c.source})"
         for c in study.performance.costs
         if c.mirror == "given" and (c.source, c.controller) in named and c.margin_db < 0.0
     ]
@@ -266,7 +266,10 @@ def hysteresis_cost(study: Study) -> str:
 
 def _rate_lost(cost: Cost) -> str:
     """The data rate that goes with a cost, where there is one."""
-    return "" if math.isnan(cost.data_rate_bit_s) else f" or {-cost.data_rate_bit_s * 1e-6:.0f} Mbit/s"
+    lost = -cost.data_rate_bit_s
+    if math.isnan(lost):
+        return ""
+    return f" or {lost * 1e-6:.0f} Mbit/s" if lost >= 1e6 else f" or {quantity(lost, 'bit/s')}"
 
 
 def loop_in_budget(study: Study) -> list[str]:
@@ -347,13 +350,16 @@ def beyond_identified(study: Study, run: Run) -> str:
         study: a run of a whole mission.
         run: one of its runs of the paper's loop.
     """
-    table, (low, high) = study.file.mission.mirror, run.drive_span_v
+    table = study.file.mission.mirror
+    low, high = (end + table.bias_v for end in run.drive_span_v)
     beyond = []
     if run.fastest_drive_v_s > table.rate_limit_v_s:
-        beyond.append(f"{run.fastest_drive_v_s:.3g} V/s (identified up to {table.rate_limit_v_s:.3g} V/s)")
-    if low + table.bias_v < table.drive_min_v or high + table.bias_v > table.drive_max_v:
-        known = f"identified from {table.drive_min_v:.3g} to {table.drive_max_v:.3g} V"
-        beyond.append(f"{low + table.bias_v:.3g} to {high + table.bias_v:.3g} V ({known})")
+        fastest, most = apart(run.fastest_drive_v_s, table.rate_limit_v_s, "V/s")
+        beyond.append(f"{fastest} (identified up to {most})")
+    if low < table.drive_min_v or high > table.drive_max_v:
+        least, known = (text.removesuffix(" V") for text in apart(low, table.drive_min_v, "V"))
+        most, known_most = apart(high, table.drive_max_v, "V")
+        beyond.append(f"{least} to {most} (identified from {known} to {known_most})")
     if run.mirror == Variant.STRAIGHT or not beyond:
         return ""
     return f"{run.trace.name}: the mirror model is extrapolated to a drive of {' and of '.join(beyond)}"
@@ -455,7 +461,7 @@ def _of_loops(study: Study) -> list[str]:
     if not amplifier.output_min_v <= amplifier.gain * low <= amplifier.gain * high <= amplifier.output_max_v:
         found.append(f"{drawn} the amplifier's range")
     return found + [
-        f"hysteresis loop at {loop.freq_hz:g} Hz: {loop.clamped} samples beyond the identified rate"
+        f"hysteresis loop at {loop.freq_hz:g} Hz: {counted(loop.clamped, 'sample')} beyond the identified rate"
         for loop in study.loops
         if loop.clamped
     ]
@@ -467,12 +473,14 @@ def _of_runs(study: Study) -> list[str]:
     for run in study.runs:
         c = run.trace.counts
         counts = {
-            "steps beyond the identified rate": c.clamped + c.inverse_clamped,
-            "saturated samples": c.saturated,
-            "slew-limited steps": c.slew_limited,
-            "reversals of the command within 10 samples of the last": c.alternating,
+            ("step", " beyond the identified rate"): c.clamped + c.inverse_clamped,
+            ("saturated sample", ""): c.saturated,
+            ("slew-limited step", ""): c.slew_limited,
+            ("reversal", " of the command within 10 samples of the last"): c.alternating,
         }
-        found += [f"{run.trace.name}: {count} {what}" for what, count in counts.items() if count]
+        found += [
+            f"{run.trace.name}: {counted(count, noun)}{where}" for (noun, where), count in counts.items() if count
+        ]
     return found
 
 

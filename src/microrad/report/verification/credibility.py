@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from microrad.report.quantities import are
 from microrad.report.registry import Status
 from microrad.report.verification.standard import level_means
 
@@ -72,8 +73,8 @@ def _capability(
             "Verification",
             verified,
             f"{founded} of {every} printed quantities are held against an independent method, published output or a"
-            f" measurement, in this installation; {every - founded} are not. All are registered and kept by references,"
-            " which show that they have not changed, and not that they are right."
+            f" measurement, in this installation; {every - founded} {are(every - founded)} not. All are registered and"
+            " kept by references, which show that they have not changed, and not that they are right."
             + ("" if holds else " Some of that evidence failed.")
             + ("" if whole else " The installed files are not the recorded ones, or there is no record of them."),
             {

@@ -74,7 +74,9 @@ def _found(v: Verification) -> Iterator[Warned]:
     if v.bare:
         yield Warned(
             "h",
-            f"{len(v.bare)} quantities were compared with nothing and have no source.",
+            "1 quantity was compared with nothing and has no source."
+            if len(v.bare) == 1
+            else f"{len(v.bare)} quantities were compared with nothing and have no source.",
             "An error in them would not be found here. A mission's report marks them.",
         )
     yield Warned(
