@@ -531,3 +531,7 @@ def test_numbers_left_of_a_second_variable_are_read_from_their_own_place_and_its
     (tmp_path / "a.mat").write_bytes((tmp_path / "a.mat").read_bytes()[:-11])
     with pytest.raises(MatlabFileError, match=f"^the variable at byte {b.variable}: an element is cut off, 11 b"):
         file.numbers(b)
+
+
+def test_names_that_are_those_of_others_told_apart_stay_apart():
+    assert reader._distinct(["x", "x", "_1_x", "x"]) == ("x", "_1_x", "_1__1_x", "_2_x")

@@ -197,9 +197,8 @@ def test_the_answer_of_words_is_the_mean_of_the_runs_with_the_band_of_their_tria
 def test_the_margin_of_a_link_with_a_fibre_is_that_of_its_beam_and_of_all_that_it_may_lose(tmp_path, receives):
     table = {"into": "single-mode fibre", "mode_radius": "best", **receives}
     changes = {"beacon": None, "answer": None, "acquisition": None, "communication.coupling": table}
-    if "twin" not in receives:
-        beam = {"profile": "gaussian", "radius": "23 mm", "m_squared": 1.2}  # it falls off unlike a Gaussian
-        changes |= {"communication.beam": beam, "conventions.pointing_loss": "pattern"}
+    beam = {"profile": "gaussian", "radius": "23 mm", "m_squared": 1.2}  # it falls off unlike a Gaussian
+    changes |= {"communication.beam": beam, "conventions.pointing_loss": "pattern"}
     changes["communication.transmit_power"] = "9 W"
     data = link.of(link_file(tmp_path, changes, {"requirement.outage": 0.01}).mission)
     margin, under, twin = FadeMargin.of(data), outage.Exposure.stated(data), "twin" in receives

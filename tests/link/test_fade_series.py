@@ -362,6 +362,15 @@ def test_a_series_is_refused_that_is_shorter_than_a_word_or_an_interleaver_or_sa
         CodedLink(CODE, series, RATE, "block")
     with pytest.raises(FadeSeriesError, match="the interleaving is 'blocks'; give one of none, block"):
         CodedLink(CODE, series, RATE, "blocks", 1e-3)
+    for span_s, shown in ((-1e-3, "-1 ms"), (math.nan, "nan s"), (math.inf, "inf s")):
+        with pytest.raises(FadeSeriesError, match=f"^series: the span of the interleaver is {shown}: it must"):
+            CodedLink(CODE, series, RATE, "block", span_s)
+    for rate in (0.0, -5.0, math.nan):
+        with pytest.raises(FadeSeriesError, match=r"^series: the data rate is .*: it must be finite, above 0 bit/s"):
+            linked(series, rate=rate)
+    for target in (0.0, -1e-6, 2.0, math.nan):
+        with pytest.raises(FadeSeriesError, match=r"^series: the error ratio is .*: it must be finite, above 0, at"):
+            coded_fading(linked(series), 3.0, target)
     coded_fading(linked(series), 3.0, 1e-6)
     coarse = series_of(scintillation(1024, 0.1, 1))
     words = r"sampled slower than its fades: (9\d|100) % of the time below -.* in fades of a single sample, 10 µs, and"
@@ -713,3 +722,11 @@ def test_the_code_of_ccsds_has_its_numbers_at_each_power(snr_db, expected):
     assert found == pytest.approx(expected, rel=1e-6, abs=0.0)
     mixed = CODE.ratio([0.5 * (a + b) for a, b in zip(CODE.parts(snr), CODE.parts(2.0 * snr), strict=True)])
     assert CODE.at(2.0 * snr)[0] <= mixed[0] <= CODE.at(snr)[0]
+
+
+@pytest.mark.parametrize("period_s", [0.0, -1.0, math.nan, math.inf])
+def test_a_sampling_period_that_is_none_is_refused_as_a_period(tmp_path, period_s):
+    path = tmp_path / "a.csv"
+    path.write_text("power\n" + "1\n" * 300)
+    with pytest.raises(FadeSeriesError, match=r"a\.csv: the sampling period is .*: it must be finite, above 0 s"):
+        read_fade_series(path, unit="linear", normalised="mean", period_s=period_s)

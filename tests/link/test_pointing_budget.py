@@ -205,6 +205,8 @@ def test_the_words_of_a_line_say_what_was_calculated():
     assert "error / (2 sqrt(2))" in error_classes.basis(stated("random", "2-sigma", "radial"))
     mixed = error_classes.basis(stated("drift", "2-sigma"), "mixed")
     assert mixed.endswith("error / 2 / sqrt(3), ramp from zero; random satellite at a random time (mixed)")
+    bound = error_classes.basis(stated("drift", "bound"), "mixed")
+    assert "standard deviation error / sqrt(3) / sqrt(3), evenly up to the bound, ramp from zero; random" in bound
     assert "counted as always present" in error_classes.basis(stated("transient", axes="x"))
 
 

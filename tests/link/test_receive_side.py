@@ -13,6 +13,7 @@ from microrad.campaign.rows.evaluate import _exposure
 from microrad.link import coupling
 from microrad.link import study as link_study
 from microrad.link.acquisition.partner_search import _return_reach
+from microrad.link.beams import GaussianFall
 from microrad.link.budget.lines import _coupling_lines, _few_modes
 from microrad.link.pointing import outage as link_performance
 from microrad.link.pointing.code_words import FadeMargin
@@ -372,3 +373,31 @@ def test_a_fibre_of_few_modes_is_warned_of(radius_um, aperture, few):
     radius_m = None if radius_um is None else radius_um * 1e-6
     said = _few_modes(SimpleNamespace(core_radius_m=radius_m, numerical_aperture=aperture), 1.55e-6)
     assert said.startswith("the fibre has V = 1.62, too few modes") if few else said == ""
+
+
+CUT_BEAM = {
+    "communication.beam": {"profile": "gaussian", "radius": "23 mm", "m_squared": 1.2},
+    "conventions.pointing_loss": "pattern",
+    "communication.transmit_power": "9 W",
+}
+
+
+def test_fades_beside_a_receiver_that_hardly_moves_are_those_of_the_transmitter_alone_whatever_its_beam(tmp_path):
+    wide = {"jitter.rms": ["6 urad", "5 urad"]}
+    barely = {"jitter.bias": ["0 urad", "0 urad"], "jitter.rms": ["1e-3 urad"] * 2, "jitter.bandwidth": "5 Hz"}
+    alone, both = (
+        link_performance.performance_under_jitter(
+            link.of(with_coupling(tmp_path, FIBRE | own, JITTER, CUT_BEAM, wide).mission)
+        )
+        for own in ({}, barely)
+    )
+    assert both.fades_per_s == pytest.approx(alone.fades_per_s, rel=2e-3)
+    assert both.fade_s == pytest.approx(alone.fade_s, rel=2e-3)
+
+
+def test_a_beam_that_is_like_another_has_lost_the_margin_at_the_same_error(tmp_path):
+    data = link.of(with_coupling(tmp_path, FIBRE | {"twin": True}, JITTER, CUT_BEAM).mission)
+    found, fall = FadeMargin.of(data), data.beam.fall
+    like = GaussianFall(found.light.half_angle_rad)
+    assert float(like.loss_db(fall.error_rad(found.loss_db))) == pytest.approx(found.loss_db, rel=1e-9)
+    assert abs(like.half_angle_rad / fall.half_angle_rad - 1.0) > 1e-3

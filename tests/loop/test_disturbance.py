@@ -494,6 +494,8 @@ def test_a_table_without_heading_is_read_in_the_given_unit(tmp_path):
         ("1,4\n2,3\n5,1\n", "urad", '"urad" is no unit of a density; say one of rad'),
         ("kHz, urad^2/Hz\n1,4\n2,3\n5,1\n", None, 'the heading says "kHz"; give frequencies in Hz'),
         ("rad/s, urad^2/Hz\n1,4\n2,3\n5,1\n", None, 'the heading says "rad/s"; give frequencies in Hz'),
+        ("Hz; urad²/Hz of µrad/s\n1;4\n2;3;9\n5;1\n", None, "line 3: 3 columns; give two"),  # no frequency in rad/s
+        ("Hz; urad²/Hz of μrad/s\n1;4\n2;3;9\n5;1\n", None, "line 3: 3 columns; give two"),
         ("Hz, urad^2/Hz\n1,4\n2,3,9\n5,1\n", None, "line 3: 3 columns; give two"),
         ("Hz, urad^2/Hz\n1,4\n2\n5,1\n", None, "line 3: 1 columns; give two"),
         ("Hz; urad^2/Hz\n1,5;4\n2;3\n5;1\n", None, 'line 2: "1,5;4" is not two numbers; decimals take a point'),

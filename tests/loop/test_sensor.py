@@ -92,6 +92,8 @@ def test_a_delay_inside_a_plant_step_is_refused_with_the_nearest_that_would_do(d
         ({"resolution_rad": -1e-9}, "resolution_rad is -1 nrad"),
         ({"rate_hz": 0.0}, "sample rate is 0 Hz; give a finite number above 0 Hz"),
         ({"rate_hz": math.nan}, "sample rate is nan"),
+        ({"rate_hz": 1e-320}, r"sample rate is .*Hz; give a finite number above 0 Hz, from 1e-30 to 1e\+30"),
+        ({"delay_s": 1e308}, r"delay is .*; give a finite number of at least 0 and at most 1e\+30 \("),
         ({"delay_s": -1e-4}, "delay is -100 µs; give a finite number of at least 0"),
         ({"delay_s": math.nan}, "delay is nan"),
         ({"control_rate_hz": math.inf}, "control rate is inf"),

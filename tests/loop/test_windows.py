@@ -306,6 +306,10 @@ def test_refusals():
             recorded_rms(none, 0.01, index)
     with pytest.raises(ValueError, match=r"PDE: its times are shorter than two samples of 0\.01 s"):
         recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.1, 0.004))
+    with pytest.raises(ValueError, match=r"of 0\.01 s, or its spacing than one: give longer ones"):
+        recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.1, 0.004))
+    with pytest.raises(ValueError, match=r"MPE looks at 1e\+20 s, and the recording is 5e-299 s long"):
+        recorded_rms(rad, 1e-300, ErrorIndex("MPE", 1e20))
     assert recorded_rms(rad, 0.01, ErrorIndex("PDE", 0.02, 0.01)) == 0.0
     with pytest.raises(ValueError, match='sided is "": say "one" or "two"'):
         tabulated_rms([1.0, 2.0], [1.0, 1.0], index, "")
@@ -469,7 +473,7 @@ def test_motion_whose_modes_coincide_counts_as_its_density(index):
 @pytest.mark.parametrize(
     ("window", "spacing", "said"),
     [
-        (0.014, None, "RPE: its times are shorter than two samples of 0.01 s: give longer ones"),
+        (0.014, None, "RPE: its times are shorter than two samples of 0.01 s, or its spacing than one: give longer ones"),
         (0.015, None, None), (4.0, None, None), (4.02, None, "RPE looks at 4.02 s, and the recording is 4 s long: "
                                                             "give shorter times or a longer recording"),
         (1.5, 2.5, None), (1.5, 2.52, "PDE looks at 4.02 s, and the recording is 4 s long: give shorter times or a "

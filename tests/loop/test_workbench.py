@@ -112,7 +112,9 @@ def test_damping_reads_the_gauge():
         ({"rate_hz": 0.0}, "rate_hz of a loop is 0.0: give a number above 0"),
         ({"rate_hz": np.inf}, "rate_hz of a loop is inf: give a number above 0"),
         ({"slew_v_s": -1.0}, "slew_v_s of a loop is -1.0"),
-        ({"steps_per_sample": 0}, "0 plant steps a sample: give 1 or more"),
+        ({"steps_per_sample": 0}, "0 plant steps a sample: give a whole number, 1 or more"),
+        ({"steps_per_sample": 2.5}, r"2\.5 plant steps a sample: give a whole number, 1 or more"),
+        ({"optics": [[1.0]] * 3}, "3 line-of-sight angles and may have one or two: give optics of one or two rows"),
         ({"drive_range_v": (1.0, 2.0)}, "rest, 0 V, has to lie inside"),
         ({"delay_s": 13e-6}, "loop: its delay of 13 µs is no whole number of plant steps of 10 µs"),
         ({"delay_s": -1e-5}, "loop: delay"),
@@ -246,8 +248,9 @@ def test_a_loop_and_a_controller_have_a_rate_that_can_be(rate_hz):
     mirror = Mirror.of(5e-5, [1.0], [1 / 6000**2, 0.8 / 6000, 1.0])
     with pytest.raises(ValueError, match="rate_hz of a loop is"):
         Loop(mirror=mirror, rate_hz=rate_hz)
-    with pytest.raises(ValueError, match="give one axis or more and a rate above 0 Hz"):
-        Controller.pid(0.0, 2e6, rate_hz=rate_hz)
+    for rate, axes in ((rate_hz, 1), (10e3, 1.5)):
+        with pytest.raises(ValueError, match="give one axis or more and a rate above 0 Hz"):
+            Controller.pid(0.0, 2e6, rate_hz=rate, axes=axes)
 
 
 @pytest.mark.parametrize(("above", "bound_by"), [(1.001, ("modulus margin",)), (1.1, ())])
@@ -282,7 +285,7 @@ OF_TWO = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=2)
         (
             lambda: replace(LOOP, steps_per_sample=0),
             ValueError,
-            "a loop has 0 plant steps a sample: give 1 or more, better 10",
+            "a loop has 0 plant steps a sample: give a whole number, 1 or more, better 10",
         ),
         (
             lambda: replace(LOOP, drive_range_v=(0.5, 2.5)),
@@ -478,3 +481,11 @@ def test_loops_of_numbers_unlike_each_other(found, expected):
 )
 def test_loops_and_controllers_are_shown_with_their_names(found, expected):
     assert found() == expected
+
+
+@pytest.mark.parametrize("seconds", [math.nan, math.inf, -math.inf])
+def test_a_run_of_seconds_that_are_not_finite_is_refused(seconds):
+    with pytest.raises(ValueError, match=f"a run of {seconds:g} s that settles for 0 s: give finite seconds"):
+        LOOP.simulate(SLOW, seconds)
+    with pytest.raises(ValueError, match=f"a run of 1 s that settles for {seconds:g} s: give finite seconds"):
+        LOOP.ensemble(SLOW, 1, 1.0, settle_s=seconds)

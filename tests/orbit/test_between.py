@@ -81,3 +81,14 @@ def test_a_search_says_which_of_two_satellites_ends_it(tmp_path, duration_s, wor
     if duration_s > 0.0:
         with pytest.raises(OrbitError, match=r"two\.tle, line 2 \(EXAMPLE 1\): the elements are expired"):
             find_contacts(first, second, START, duration_s)
+
+
+def test_an_orbit_of_another_epoch_is_refused_and_so_is_a_station_that_stands_first(leo):
+    other = GeostationarySlot("relay", Epoch("2026-03-20T18:00:00Z"), math.radians(9.0))
+    words = r"'relay' counts its times from 2026-03-20T18:00:00Z, and the search from 2026-03-20T12:00:00Z: start"
+    for sides in ((leo, other), (other, leo)):
+        with pytest.raises(OrbitError, match=words):
+            find_contacts(*sides, START, 7200.0)
+    station = Station("north", math.radians(68.0), math.radians(21.0), 400.0, math.radians(10.0))
+    with pytest.raises(OrbitError, match="'north' stands first: give the satellite first"):
+        find_contacts(station, leo, START, 7200.0)

@@ -1135,3 +1135,22 @@ def test_a_refusal_of_orbits_and_places_says_every_number(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(
+    ("text", "inside_s", "outside_s"),
+    [("2050-12-30T20:00:00Z", 100_799.0, 100_800.0), ("1973-01-02T20:00:00Z", -72_000.0, -72_000.1)],
+)
+def test_the_first_and_the_last_day_are_inside_to_their_ends_whatever_the_time_of_day(text, inside_s, outside_s):
+    assert Epoch(text).utc(inside_s) in ("2050-12-31T23:59:59.000Z", "1973-01-02T00:00:00.000Z")
+    with pytest.raises(OrbitError, match="outside 1973-01-02 to 2050-12-31"):
+        Epoch(text).utc(outside_s)
+
+
+def test_leap_seconds_are_counted_to_the_last_second_of_the_tables():
+    first, last = Epoch("1973-01-02T00:00:00Z"), Epoch("2050-12-31T23:59:59Z")
+    assert first.utc(first.seconds_to(last)) == "2050-12-31T23:59:59.000Z"
+    assert last.utc(last.seconds_to(first)) == "1973-01-02T00:00:00.000Z"
+    for one, beyond_s in ((first, first.seconds_to(last) + 1.0), (last, last.seconds_to(first) - 1.0)):
+        with pytest.raises(OrbitError, match="outside 1973-01-02 to 2050-12-31"):
+            one.utc(beyond_s)

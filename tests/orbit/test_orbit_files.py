@@ -551,6 +551,11 @@ OMM_FAULTS = {
     "JSON empty": ("[]", "no element set"),
     "CSV": (comma(FIELDS) + "a,b\n", "line 3", "2 values"),
     "drag": (kvn({**FIELDS, "BSTAR": "1e308"}), "B* is 1e+308", "less than 1 per radius of the Earth"),
+    "version": (kvn(FIELDS).replace("VERS = 2.0", "VERS = 9.0"), "line 1", "CCSDS_OMM_VERS is '9.0'; read are"),
+    "XML version": (xml(FIELDS).replace('version="2.0"', 'version="4.0"'), "CCSDS_OMM_VERS is '4.0'; read are"),
+    "CSV columns": (comma({**FIELDS, "bstar": "7"}), "line 2", "BSTAR is '7', but line 2 has"),
+    "JSON keys": (as_json({**FIELDS, "bstar": "7"}), "entry 1", "BSTAR is '7', but entry 1 has"),
+    "blanks before CSV": ("  \n" + comma(FIELDS) + "a,b\n", "line 4", "2 values"),
     "SGP4-XP": (as_json({**FIELDS, "EPHEMERIS_TYPE": "4"}), "another theory than SGP4"),
 }  # fmt: skip
 
@@ -826,6 +831,8 @@ def test_gap_between_segments(tmp_path):
     assert orbit.span_s == (0.0, 6000.0)
     orbit.require(0.0, 2400.0)
     orbit.require(3600.0, 6000.0)
+    orbit.require(0.0, 2400.0 + 5e-7)  # as far as states are given
+    orbit.states(2400.0 + 5e-7)
     for start, end in ((0.0, 6000.0), (2000.0, 2500.0), (2500.0, 3000.0), (3500.0, 4000.0)):
         with pytest.raises(OrbitError, match=r"12:40:00\.000Z, 2026-03-20T13:00:00\.000Z to"):
             orbit.require(start, end)
@@ -881,6 +888,9 @@ def test_objects_of_a_file(tmp_path):
     no_ephemeris(tmp_path, text, "EXAMPLE 1 (2026-001A), EXAMPLE 2 (2026-001B)", "name one of them")
     with pytest.raises(OrbitError, match="'EXAMPLE 3' names 0 of them"):
         ephemeris(tmp_path, text, name="EXAMPLE 3")
+    several = [segment(GRID, OBJECT_NAME=f"N {k}") for k in range(9)]
+    no_ephemeris(tmp_path, HEAD + "".join(several[:8]), "N 7 (2026-001A), and no object is named")
+    no_ephemeris(tmp_path, HEAD + "".join(several), "N 7 (2026-001A) and others, and no object is named")
 
 
 # ------------------------------------------------------------------------------------------------------- malformed OEM
@@ -993,6 +1003,9 @@ OEM_FAULTS = {
     "no number in m/s": (with_word(4, 6, "1e308"), "line 20", "holds nan, inf or a number beyond 1e+300"),
     "distance beyond all": (with_word(4, 2, "1e299"), "line 20", "where no satellite of the Earth is"),
     "word": (with_word(4, 1, "abc"), "line 20", "X is 'abc'"),
+    "underscore": (with_word(4, 1, "6_900.0"), "line 20", "X is '6_900.0'"),
+    "XML version": (oem_xml(GRID, "4.0"), "line 2", "CCSDS_OEM_VERS is '4.0'; read are 1, 2 and 3"),
+    "stop beyond the tables": (HEAD + segment(GRID, STOP_TIME="2055-01-01T00:00:00"), "line 13", "outside"),
     "time": (with_word(4, 0, "20/03/2026"), "line 20", "'20/03/2026', not a date and time"),
     "hour": (with_word(4, 0, "2026-03-20T25:00:00"), "not a date and time"),
     "day of the year": (with_word(4, 0, "2026-366T12:00:00"), "not a date and time"),
@@ -1139,10 +1152,11 @@ def test_a_name_is_asked_for_whatever_its_capitals_and_the_blanks_about_it(tmp_p
         assert [e.name for e in elements(tmp_path, NAMED, asked)] == ["EXAMPLE 1"]
 
 
+@pytest.mark.parametrize("blank", ["\n\n", "  \n\t\n"])
 @pytest.mark.parametrize("notation", ["kvn", "json", "csv"])
-def test_empty_lines_before_a_message_are_passed_over(tmp_path, notation):
+def test_empty_lines_before_a_message_are_passed_over(tmp_path, notation, blank):
     plain = elements(tmp_path, NOTATIONS[notation](FIELDS))[0]
-    (found,) = elements(tmp_path, "\n\n" + NOTATIONS[notation](FIELDS))
+    (found,) = elements(tmp_path, blank + NOTATIONS[notation](FIELDS))
     assert replace(found, place="") == replace(plain, place="")
 
 
@@ -1551,7 +1565,7 @@ def test_xml_is_told_as_fields_and_containers_in_their_order(monkeypatch):
     )
     found = [tuple(each) for each in messages.xml_fields(Path("f"), text)]
     assert found == [
-        ("<omm", "", "", "line 2"), ("a", "1.5", "km", "line 3"), ("b", "", "", "line 4"), ("<c", "", "", "line 5"),
+        ("<omm", "2.0", "", "line 2"), ("a", "1.5", "km", "line 3"), ("b", "", "", "line 4"), ("<c", "3", "", "line 5"),
         ("d", "2&3", "s", "line 5"), ("</c", "", "", "line 5"), ("e", "fg", "", "line 6"), ("</omm", "", "", "line 2"),
     ]  # fmt: skip
 
@@ -1880,3 +1894,8 @@ def test_the_objects_of_an_ephemeris_are_listed_by_name_and_identifier(tmp_path,
         assert str(refused.value).startswith(f"{tmp_path / 'a.txt'}: it holds the objects {names}")
         assert str(refused.value).endswith(f", and {wanted}; name one of them")
     assert ephemeris(tmp_path, text, name="id-1").name == ephemeris(tmp_path, text, name="Sat 1").name == "SAT 1"
+
+
+def test_a_satellite_of_several_element_sets_is_offered_once(tmp_path):
+    with pytest.raises(OrbitError, match="none of its 3 element sets is of 'EXAMPEL'; nearest are EXAMPLE 1: name"):
+        elements(tmp_path, NAMED * 3, "EXAMPEL")

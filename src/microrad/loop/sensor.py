@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from microrad.core.budget import Line, root_sum_square
-from microrad.core.units import ELEMENTARY_CHARGE_C, format_quantity
+from microrad.core.units import ELEMENTARY_CHARGE_C, LEAST, MOST, format_quantity
 
 RATE_TOLERANCE = 1e-9
 """How far, relatively, a sensor's period or delay may lie from a whole number of control samples or plant steps."""
@@ -341,13 +341,15 @@ def _shown(value: float, unit: str) -> str:
 
 
 def _zero_or_more(what: str, value: float, unit: str, note: str) -> None:
-    if not 0.0 <= value < math.inf:
-        raise ValueError(f"{what} is {_shown(value, unit)}; give a finite number of at least 0 ({note})")
+    if not 0.0 <= value <= MOST:
+        most = f" and at most {MOST:g}" if MOST < value < math.inf else ""
+        raise ValueError(f"{what} is {_shown(value, unit)}; give a finite number of at least 0{most} ({note})")
 
 
 def _above_zero(what: str, value: float, unit: str) -> None:
-    if not 0.0 < value < math.inf:
-        raise ValueError(f"{what} is {_shown(value, unit)}; give a finite number above 0 {unit}")
+    if not LEAST <= value <= MOST:
+        limits = f", from {LEAST:g} to {MOST:g}" if 0.0 < value < math.inf else ""
+        raise ValueError(f"{what} is {_shown(value, unit)}; give a finite number above 0 {unit}{limits}")
 
 
 def _whole(what: str, value: object, least: int, meaning: str) -> None:

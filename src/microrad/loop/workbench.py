@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Integral
 from typing import Literal
 
 import numpy as np
@@ -97,7 +98,7 @@ class Controller:
         gains = (proportional_v_rad, integral_v_rad_s, derivative_v_s_rad, derivative_filter_s)
         if not all(abs(each) <= MOST for each in gains) or derivative_filter_s < 0.0:
             raise ValueError(f"gains {gains[:3]} and a filter of {derivative_filter_s} s make no PID: give finite ones")
-        if not LEAST <= rate_hz <= MOST or axes < 1:
+        if not LEAST <= rate_hz <= MOST or not isinstance(axes, Integral) or axes < 1:
             raise ValueError(f"a PID of {axes} axes at {rate_hz} Hz: give one axis or more and a rate above 0 Hz")
         one = control.pid(control.Gains(*gains), 1.0 / rate_hz)
         parts = (one.A, one.B, one.C, one.D, control.anti_windup(one))
@@ -140,7 +141,8 @@ class Loop:
         drive_range_v: Least and largest drive (V).
         amplifier_bandwidth_hz: Bandwidth of a first-order amplifier (Hz).
         slew_v_s: Its largest rate (V/s).
-        optics: Line-of-sight angles from the mirror's outputs, shape (axes, outputs); by default the outputs.
+        optics: Line-of-sight angles from the mirror's outputs, shape (axes, outputs), one or two axes; by
+            default the outputs.
         steps_per_sample: Plant steps in a control period, 1 or more.
 
     Raises:
@@ -181,11 +183,17 @@ class Loop:
             value = getattr(self, name)
             if not LEAST <= value <= MOST and not (value == math.inf and name != "rate_hz"):
                 raise ValueError(f"{name} of a loop is {value}: give a number above 0")
-        if self.steps_per_sample < 1:
-            raise ValueError(f"a loop has {self.steps_per_sample} plant steps a sample: give 1 or more, better 10")
+        if not isinstance(self.steps_per_sample, Integral) or self.steps_per_sample < 1:
+            raise ValueError(
+                f"a loop has {self.steps_per_sample} plant steps a sample: give a whole number, 1 or more, better 10"
+            )
         low, high = self.drive_range_v
         if not low < 0.0 < high:
             raise ValueError(f"drive_range_v of a loop is ({low}, {high}) V: rest, 0 V, has to lie inside")
+        if self.axes > 2:
+            raise ValueError(
+                f"a loop has {self.axes} line-of-sight angles and may have one or two: give optics of one or two rows"
+            )
         if self.gauge_noise_rad is not None and self._optics.shape != (self.mirror.axes, self.mirror.axes):
             raise ValueError("a loop with a gauge needs one line-of-sight angle for each output of the mirror")
         _ = self.parts  # refuses what is wrong of delays and sensors
@@ -379,7 +387,7 @@ def tune(
     """Find the controller of a kind that leaves the least error in the linear loop, under a modulus margin.
 
     Args:
-        loop: The loop, with vibration or noise to work against.
+        loop: The loop, with vibration to work against.
         kind: "PI", "PI + notch", "resonant damping" (needs a gauge), "disturbance observer" or "LQG" for one axis;
             "LQG" or "H-infinity" for several.
         modulus_margin: Least distance of the loop gain from -1, above 0 and below 1.
@@ -387,7 +395,7 @@ def tune(
         on_progress: Called with the steps that are done, their number and what is done.
 
     Raises:
-        ValueError: For a kind that this loop cannot have, a loop without anything to work against, and a margin that
+        ValueError: For a kind that this loop cannot have, a loop without vibration, and a margin that
             cannot be kept; says what the best one reaches.
 
     Example:

@@ -19,14 +19,15 @@ def find_contacts(
     """When two satellites see each other past the Earth, or a station sees a satellite above its mask.
 
     Args:
-        first: A satellite: an element set of a TLE or OMM file (`read_elements`), flown by SGP4, or an orbit.
+        first: A satellite: an element set of a TLE or OMM file (`read_elements`), flown by SGP4, or an orbit
+            whose epoch is `start`.
         second: Another one, or a ground station.
         start: UTC at which times count from 0, such as "2026-03-20T12:00:00Z".
         duration_s: How long is searched (s), above 0.
         grazing_height_m: Height that the line of sight between satellites has to stay above (m), over the ellipsoid.
 
     Raises:
-        OrbitError: For an instant, elements or a span that cannot be; says why.
+        OrbitError: For an instant, elements or a span that cannot be, and an orbit of another epoch; says why.
 
     Example:
         ```python
@@ -50,7 +51,15 @@ def find_contacts(
 
 
 def _flown(given: ElementSet | Orbit, epoch: Epoch, duration_s: float) -> Orbit:
+    if isinstance(given, Station):
+        raise OrbitError(f"station {given.name!r} stands first: give the satellite first, and the station second")
     if not isinstance(given, ElementSet):
+        own: Epoch = getattr(given, "epoch", epoch)
+        if own.seconds_to(epoch):
+            raise OrbitError(
+                f"orbit {given.name!r} counts its times from {own.text}, and the search from {epoch.text}: "
+                "start the search there, or make the orbit with this epoch"
+            )
         return given
     orbit = Sgp4Orbit(given, epoch)
     orbit.require(0.0, duration_s)

@@ -263,11 +263,13 @@ def _too_many() -> MatlabFileError:
 def _distinct(names: list[str]) -> tuple[str, ...]:
     """Names that stand more than once, which MATLAB never writes, numbered as SciPy does: x, _1_x, _2_x."""
     seen: dict[str, int] = {}
-    found = []
     for name in names:
-        number = seen[name] = seen.get(name, -1) + 1
-        found.append(f"_{number}_{name}" if number else name)
-    return tuple(found)
+        made = name
+        while made in seen:
+            seen[name] += 1
+            made = f"_{seen[name]}_{name}"
+        seen[made] = 0
+    return tuple(seen)
 
 
 @contextmanager

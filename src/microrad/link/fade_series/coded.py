@@ -13,7 +13,8 @@ from microrad.core.arrays import Floats
 from microrad.core.intervals import Interval, clustered_band, student
 from microrad.core.units import format_quantity
 from microrad.link.fade_series.codes import CodeModel
-from microrad.link.fade_series.records import Fades, FadeSeries, FadeSeriesError
+from microrad.link.fade_series.records import Fades, FadeSeries, FadeSeriesError, check
+from microrad.mission.fields import Quantity
 
 Interleaving = Literal["none", "block", "convolutional"]
 """How symbols are spread: not, over blocks that stand behind each other, or over a window that slides along."""
@@ -78,7 +79,7 @@ class CodedLink:
 
     Raises:
         FadeSeriesError: For a series that is shorter than a window, and for an interleaver without a span or a span
-            without one.
+            without one, and a data rate that is not above 0.
     """
 
     code: CodeModel
@@ -93,6 +94,8 @@ class CodedLink:
             raise FadeSeriesError(
                 f"the interleaving is {self.interleaving!r}; give one of {', '.join(get_args(Interleaving))}."
             )
+        check("the data rate", self.data_rate_bit_s, Quantity("bit/s", above=0.0), self.series.source)
+        check("the span of the interleaver", self.span_s, Quantity("s", least=0.0), self.series.source)
         if (self.interleaving == "none") != (self.span_s == 0.0):
             raise FadeSeriesError(
                 f"interleaving is {self.interleaving!r} and its span {format_quantity(self.span_s, 's')}; give a span "
@@ -167,8 +170,9 @@ def coded_fading(link: CodedLink, margin_db: float, target: float) -> CodedFadin
         target: Error ratio that is wanted.
 
     Raises:
-        FadeSeriesError: For a series that is sampled slower than its fades.
+        FadeSeriesError: For a series that is sampled slower than its fades, and a target that is no error ratio.
     """
+    check("the error ratio", target, Quantity("", above=0.0, most=1.0), link.series.source)
     penalty, curve = cost(link, target)
     level = 10.0 ** (-0.1 * (penalty if math.isfinite(penalty) else margin_db))
     fades = link.series.resolves(level)

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from microrad.lab.recording import RecordingError, read_signal
-from microrad.link.fade_series.records import LEAST_SAMPLES, FadeSeries, FadeSeriesError, Normalisation, Unit
+from microrad.link.fade_series.records import LEAST_SAMPLES, FadeSeries, FadeSeriesError, Normalisation, Unit, check
+from microrad.mission.fields import Quantity
 
 MOST_BYTES = 200_000_000
 """Largest file that is read."""
@@ -39,6 +40,8 @@ def read_fade_series(
             refuses.
     """
     path, called = Path(path), name or str(path)
+    if period_s is not None:
+        check("the sampling period", period_s, Quantity("s", above=0.0), called)
     try:
         if path.is_file() and path.stat().st_size > MOST_BYTES:
             raise FadeSeriesError(

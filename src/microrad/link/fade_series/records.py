@@ -29,8 +29,6 @@ A fade of one sample lasts between nothing and two periods. Where the samples kn
 the faded time is such; where a fade has some samples it tends to none.
 """
 
-_PERIOD = Quantity("s", above=0.0)
-
 
 class FadeSeriesError(MicroradError):
     """A series of powers that cannot be used: the message says what, where, the limit, and what to do."""
@@ -99,10 +97,7 @@ class FadeSeries:
         for word, kind, called in ((unit, Unit, "unit"), (normalised, Normalisation, "normalisation")):
             if word not in get_args(kind):
                 raise FadeSeriesError(f"{source}: the {called} is {word!r}; give one of {', '.join(get_args(kind))}.")
-        try:
-            _PERIOD.check("the sampling period", period_s)
-        except ValueError as error:
-            raise FadeSeriesError(f"{source}: {error}.") from None
+        check("the sampling period", period_s, Quantity("s", above=0.0), source)
         given = reals(power, f"{source}: power", FadeSeriesError, most=math.inf)
         linear = _linear(given, source, unit)
         if normalised != "as-given":
@@ -210,6 +205,24 @@ def _linear(given: Floats, source: str, unit: Unit) -> Floats:
 
 
 _MOST_DB, _MOST = 300.0, 1e30
+
+
+def check(name: str, value: float, quantity: Quantity, source: str) -> None:
+    """Check a value that comes from no file.
+
+    Args:
+        name: What the value is, in the words of the message.
+        value: The value, in the unit of the quantity.
+        quantity: Its unit and its bounds.
+        source: Of which series it is said.
+
+    Raises:
+        FadeSeriesError: For a value that is not finite or out of bounds.
+    """
+    try:
+        quantity.check(name, value)
+    except ValueError as error:
+        raise FadeSeriesError(f"{source}: {error}.") from None
 
 
 def part(series: FadeSeries, first: int, last: int) -> FadeSeries:

@@ -49,7 +49,7 @@ class FadeMargin:
         if light.end is None:
             return cls(light, like)
         # the beam may lose any part of it: a Gaussian one that has lost the same where all is lost
-        return cls(replace(light, half_angle_rad=light.half_angle_rad * math.sqrt(spare / like)), spare)
+        return cls(replace(light, half_angle_rad=light.half_angle_rad * math.sqrt(like / spare)), spare)
 
 
 @dataclass(frozen=True, slots=True)

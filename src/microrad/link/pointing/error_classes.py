@@ -131,8 +131,11 @@ def basis(stated: StatedError, interpretation: Interpretation = "temporal") -> s
     head = f"{stated.kind}, {stated.statistic}, {where}"
     spread, worst = _spread_text(stated), _worst_text(stated)
     if interpretation == "mixed":
-        ramp = {"drift": " / sqrt(3), ramp from zero", "transient": ", counted as always present"}.get(stated.kind, "")
-        return f"{head}: mean 0, standard deviation {spread}{ramp}; random satellite at a random time (mixed)"
+        size, comma, evenly = spread.partition(",")
+        factor = " / sqrt(3)" if stated.kind == "drift" else ""
+        ramp = {"drift": ", ramp from zero", "transient": ", counted as always present"}.get(stated.kind, "")
+        spread = f"{size}{factor}{comma}{evenly}{ramp}"
+        return f"{head}: mean 0, standard deviation {spread}; random satellite at a random time (mixed)"
     if stated.kind == "random":
         return f"{head}: mean 0, standard deviation {spread} over time"
     formula = {

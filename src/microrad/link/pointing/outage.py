@@ -346,7 +346,7 @@ def _fades(
     if received is None:
         found = pointing.fades(jitter, velocity, fall.half_angle_rad, like_gaussian_db(fall, margin_db))
     elif moves:
-        like = fall.half_angle_rad * math.sqrt(margin_db / like_gaussian_db(fall, margin_db))
+        like = fall.half_angle_rad * math.sqrt(like_gaussian_db(fall, margin_db) / margin_db)
         found = pointing.fades_of_both(replace(sent, half_angle_rad=like), received, margin_db)
     else:
         found = pointing.fades(received.jitter, received.velocity_rms_rad_s, received.half_angle_rad, left)

@@ -15,7 +15,7 @@ Unit = Literal["rad^2/Hz", "mrad^2/Hz", "urad^2/Hz", "nrad^2/Hz"]
 
 _SCALES = dict(zip(get_args(Unit), (1.0, 1e-6, 1e-12, 1e-18), strict=True))
 _DENSITY = re.compile(r"(?<![a-z])([munµμ]?)rad(?:\^2|\*\*2|²|2)\s*(?:/|_|per)\s*hz", re.IGNORECASE)
-_WRONG_FREQUENCY = re.compile(r"\b[kmg]hz\b|(?<!m)(?<!u)(?<!n)rad\s*/\s*s\b", re.IGNORECASE)
+_WRONG_FREQUENCY = re.compile(r"\b[kmg]hz\b|(?<![munµμ])rad\s*/\s*s\b", re.IGNORECASE)
 _MAX_BYTES = 100_000_000
 
 

@@ -410,12 +410,16 @@ def recorded_rms(samples_rad: ArrayLike, step_s: float, index: ErrorIndex) -> fl
         raise ValueError(f"a recorded motion has the shape {samples.shape}: give one row of finite samples, in rad")
     if index.window_s is None:
         return float(np.sqrt(np.mean(samples**2)))
-    window, apart = round(index.window_s / step_s), round((index.spacing_s or 0.0) / step_s)
+    times = index.window_s, index.spacing_s or 0.0
+    window, apart = (round(min(each / step_s, samples.size + 1.0)) for each in times)
     if window < 2 or (index.spacing_s is not None and apart < 1):
-        raise ValueError(f"{index.kind}: its times are shorter than two samples of {step_s:g} s: give longer ones")
+        raise ValueError(
+            f"{index.kind}: its times are shorter than two samples of {step_s:g} s, or its spacing than one: give "
+            "longer ones"
+        )
     if window + apart > samples.size:
         raise ValueError(
-            f"{index.kind} looks at {(window + apart) * step_s:g} s, and the recording is {samples.size * step_s:g} s "
+            f"{index.kind} looks at {sum(times):g} s, and the recording is {samples.size * step_s:g} s "
             "long: give shorter times or a longer recording"
         )
     means = _running(samples, window)

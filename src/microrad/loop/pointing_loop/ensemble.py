@@ -323,10 +323,13 @@ def control_samples(loop: PointingLoop, span: Span) -> tuple[int, int]:
         span: How long a run is, and what is left out at its begin.
 
     Raises:
-        ValueError: Nothing is left behind the settling time.
+        ValueError: Nothing is left behind the settling time, or a time is not finite.
     """
     period = loop.timing.period_s
-    total, settle = round(span.duration_s / period), round(span.settle_s / period)
+    samples = span.duration_s / period, span.settle_s / period
+    if not all(map(math.isfinite, samples)):
+        raise ValueError(f"a run of {span.duration_s:g} s that settles for {span.settle_s:g} s: give finite seconds")
+    total, settle = map(round, samples)
     if not 0 <= settle < total:
         raise ValueError(
             f"a run of {span.duration_s:g} s has nothing left behind a settling time of {span.settle_s:g} s: "

@@ -118,8 +118,11 @@ class Epoch:
         for extreme in (float(time.min()), float(time.max())):
             if not math.isfinite(extreme):
                 raise OrbitError(f"a time of {extreme} s after {self.text} is not a number; give finite seconds")
-            day = _instant(self.text).day + math.floor(extreme / DAY_S)
-            _check_day(day, f"{extreme:.6g} s after {self.text}")
+            day, second = _instant(self.text)
+            near = day + math.floor((second + extreme) / DAY_S)
+            near = min(max(near, FIRST_DAY.toordinal()), LAST_DAY.toordinal())
+            leap = _tai_minus_utc_s(near) - _tai_minus_utc_s(day)
+            _check_day(day + math.floor((second + extreme - leap) / DAY_S), f"{extreme:.6g} s after {self.text}")
 
 
 def _check_day(day: int, what: str) -> None:

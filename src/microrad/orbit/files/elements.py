@@ -16,7 +16,16 @@ from pathlib import Path
 
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth.epoch import DAY_S, Epoch
-from microrad.orbit.files.messages import Field, add_field, finite, kvn_field, read_text, utc_epoch, xml_fields
+from microrad.orbit.files.messages import (
+    Field,
+    add_field,
+    check_version,
+    finite,
+    kvn_field,
+    read_text,
+    utc_epoch,
+    xml_fields,
+)
 from microrad.orbit.propagation.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
 
 
@@ -50,7 +59,7 @@ def read_elements(path: str | Path, name: str | None = None, data: bytes | None 
     wanted, number = name.strip().casefold(), name.strip().casefold().lstrip("0") or "0"
     chosen = tuple(e for e in found if wanted == e.name.casefold() or number == e.catalogue_number.casefold())
     if not chosen:
-        near = difflib.get_close_matches(wanted, [e.name.casefold() for e in found], 3, 0.0)
+        near = difflib.get_close_matches(wanted, list({e.name.casefold(): e for e in found}), 3, 0.0)
         likely = [next(e.name for e in found if e.name.casefold() == n) for n in near]
         raise OrbitError(
             f"{path}: none of its {len(found)} element sets is of {name!r}; nearest are {', '.join(likely)}: name one "
@@ -268,6 +277,7 @@ def _kvn_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]
             continue
         given = kvn_field(path, number, line)
         if given.key == "CCSDS_OMM_VERS":
+            check_version(path, given, given.key)
             if fields:
                 yield place, fields
             place, fields = given.place, {}
@@ -285,12 +295,20 @@ def _xml_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]
     place, fields = "", dict[str, Field]()
     for given in xml_fields(path, text):
         if given.key == "<omm":
+            check_version(path, given, "CCSDS_OMM_VERS")
             place, fields = given.place, {}
         elif given.key == "</omm":
             yield place, fields
             place = ""
         elif place and given.key[0] != "<":
             add_field(fields, given, path)
+
+
+def _by_key(path: Path, given: list[Field]) -> dict[str, Field]:
+    fields = dict[str, Field]()
+    for each in given:
+        add_field(fields, each, path)
+    return fields
 
 
 def _json_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]]]:
@@ -310,13 +328,13 @@ def _json_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field
                 f"{path}, {place}: {str(record)[:40]!r} is not an object with the keys of an OMM; repair it"
             )
         plain = {k: v for k, v in record.items() if isinstance(v, str | int | float) and not isinstance(v, bool)}
-        yield place, {k.upper(): Field(k, str(v), "", place) for k, v in plain.items()}
+        yield place, _by_key(path, [Field(k.upper(), str(v), "", place) for k, v in plain.items()])
 
 
 def _csv_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]]]:
     """Messages in CSV: keys in the first line, a satellite in each of the others."""
-    rows = csv.reader(text.lstrip("\n").split("\n"))
-    skipped = len(text) - len(text.lstrip("\n"))
+    rows = csv.reader(text.lstrip().split("\n"))
+    skipped = text[: len(text) - len(text.lstrip())].count("\n")
     try:
         keys = [key.strip().upper() for key in next(rows)]
         for values in rows:
@@ -327,7 +345,7 @@ def _csv_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]
                 raise OrbitError(
                     f"{path}, {place}: {len(values)} values, but the first line names {len(keys)} columns; repair it"
                 )
-            yield place, {k: Field(k, v.strip(), "", place) for k, v in zip(keys, values, strict=True)}
+            yield place, _by_key(path, [Field(k, v.strip(), "", place) for k, v in zip(keys, values, strict=True)])
     except csv.Error as error:
         raise OrbitError(
             f"{path}, line {rows.line_num + skipped}: not CSV ({error}); download the file again"

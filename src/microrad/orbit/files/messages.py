@@ -154,8 +154,26 @@ def add_field(fields: dict[str, Field], new: Field, path: Path) -> None:
         raise new.refused(path, f", but {old.place} has {old.shown}; keep one of them")
 
 
+def check_version(path: Path, given: Field, key: str) -> None:
+    """Refuse a message of a version that is not read; XML may leave it out.
+
+    Args:
+        path: The file, for messages.
+        given: The field whose value is the version.
+        key: What the version is called in keywords and values.
+
+    Raises:
+        OrbitError: For a version that is not 1, 2 or 3.
+    """
+    if given.value.partition(".")[0] not in ("", "1", "2", "3"):
+        raise given._replace(key=key).refused(path, "; read are 1, 2 and 3: export one of these")
+
+
 class _XmlReader:
-    """Turns the events of the parser into fields; containers become fields with the keys `<tag` and `</tag`."""
+    """Turns the events of the parser into fields; containers become fields with the keys `<tag` and `</tag`.
+
+    The value of `<tag` is its version, where it has one.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -178,8 +196,8 @@ class _XmlReader:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         if self.leaf:
-            outer, _, place = self.open[-1]
-            self.found.append(Field(f"<{outer}", "", "", place))
+            outer, version, place = self.open[-1]
+            self.found.append(Field(f"<{outer}", version, "", place))
         tag = tag.rsplit(":", 1)[-1]
         place = f"line {self.parser.CurrentLineNumber}"
         self.open.append((tag, attributes.get("units", attributes.get("version", "")), place))

@@ -70,8 +70,10 @@ class _Draft:
             )
         words = words[:6]
         try:
-            numbers = list(map(float, words))
+            numbers = [float(word) for word in words if "_" not in word]
         except ValueError:
+            numbers = []
+        if len(numbers) < len(words):
             numbers = [
                 messages.finite(path, messages.Field(key, w, "", place))
                 for key, w in zip(_COLUMNS, words, strict=False)
@@ -174,6 +176,8 @@ def _xml_drafts(path: Path, text: str) -> Iterator[_Draft]:
                 draft = None
         elif given.key.startswith("<"):
             container.append(given.key[1:])
+            if given.key == "<oem":
+                messages.check_version(path, given, "CCSDS_OEM_VERS")
             if given.key == "<segment" and "oem" in container:
                 draft = _Draft(given.place)
             elif given.key == "<stateVector" and draft is not None:
@@ -229,7 +233,7 @@ def _of_object(path: Path, drafts: list[_Draft], name: str | None) -> list[_Draf
     objects = {(d.metadata["OBJECT_NAME"].value, d.metadata["OBJECT_ID"].value): d for d in drafts}
     keys = [key for key in objects if name is None or name.casefold() in (key[0].casefold(), key[1].casefold())]
     if len(keys) != 1:
-        listed = ", ".join(f"{n} ({i})" for n, i in list(objects)[:8])
+        listed = ", ".join(f"{n} ({i})" for n, i in list(objects)[:8]) + (" and others" if len(objects) > 8 else "")
         wanted = "no object is named" if name is None else f"{name!r} names {len(keys)} of them"
         raise OrbitError(f"{path}: it holds the objects {listed}, and {wanted}; name one of them")
     return [d for d in drafts if (d.metadata["OBJECT_NAME"].value, d.metadata["OBJECT_ID"].value) == keys[0]]
@@ -360,8 +364,10 @@ def _usable(path: Path, draft: _Draft, epoch: Epoch, time: Floats) -> tuple[floa
     """The usable times, those of the metadata as far as state vectors reach."""
     given, system = draft.metadata, _system(draft.metadata)
     ends = [given.get(f"USEABLE_{key}", given[key]) for key in ("START_TIME", "STOP_TIME")]
-    instants = [messages.instant(path, end, system) for end in ends]
-    start, stop = (float(t) for t in messages.elapsed_s(system, epoch, instants, f"{path}, {ends[0].place}"))
+    start, stop = (
+        float(messages.elapsed_s(system, epoch, [messages.instant(path, end, system)], f"{path}, {end.place}")[0])
+        for end in ends
+    )
     usable = max(start, float(time[0])), min(stop, float(time[-1]))
     if usable[1] <= usable[0]:
         raise OrbitError(

@@ -140,7 +140,7 @@ class EphemerisOrbit:
         if start_s < first - SLACK_S or end_s > last + SLACK_S:
             raise self._outside(start_s, end_s)
         for one, two in pairwise(self.segments):
-            if two.start_s - one.stop_s > SLACK_S and start_s < two.start_s - SLACK_S and end_s > one.stop_s:
+            if two.start_s - one.stop_s > SLACK_S and start_s < two.start_s - SLACK_S and end_s > one.stop_s + SLACK_S:
                 raise self._outside(start_s, end_s)
 
     def _check_finite(self, time: Floats) -> None:
