@@ -473,7 +473,8 @@ def test_motion_whose_modes_coincide_counts_as_its_density(index):
 @pytest.mark.parametrize(
     ("window", "spacing", "said"),
     [
-        (0.014, None, "RPE: its times are shorter than two samples of 0.01 s, or its spacing than one: give longer ones"),
+        (0.014, None, "RPE: its times are shorter than two samples of 0.01 s, or its spacing than one: give "
+                      "longer ones"),
         (0.015, None, None), (4.0, None, None), (4.02, None, "RPE looks at 4.02 s, and the recording is 4 s long: "
                                                             "give shorter times or a longer recording"),
         (1.5, 2.5, None), (1.5, 2.52, "PDE looks at 4.02 s, and the recording is 4 s long: give shorter times or a "
