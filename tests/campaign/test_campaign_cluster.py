@@ -368,7 +368,9 @@ def test_work_that_cannot_be_opened_is_an_error_with_its_words(there):
     one.close()
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "no-such-kind://x", "tcp://127.0.0.1"])
+@pytest.mark.parametrize(
+    "address", ["tcp://127.0.0.1:9", "no-such-kind://x", "tcp://127.0.0.1", "tls://127.0.0.1:9", "ucx://127.0.0.1:9"]
+)
 def test_an_address_without_a_scheduler_is_told(monkeypatch, address):
     monkeypatch.setattr(cluster, "_CONNECT_S", 1.0)
     threads = threading.active_count()

@@ -1079,3 +1079,16 @@ def test_other_loggers_and_levels_are_left_by_what_silences_the_cluster():
     assert [logger.level for logger in loggers] == [51, 51, *levels[2:]]
     undo()
     assert [logger.level for logger in loggers] == levels
+
+
+def test_a_client_that_has_just_closed_is_a_scheduler_that_is_gone():
+    engine = a_cluster(_threads={"a": 1}, _serial=0)
+    engine._look = lambda: None
+
+    def submit(*args, **options):
+        raise RuntimeError("the client has closed")
+
+    engine._client.submit = submit
+    with pytest.raises(CampaignError, match=r"^the scheduler at tcp://here is gone \(.*the client has closed\)$"):
+        list(engine.outcomes(iter([Job(0, 1)])))
+    assert (engine._flights, engine._futures) == ({}, {})

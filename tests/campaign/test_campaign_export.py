@@ -478,6 +478,7 @@ def test_a_disk_keeps_its_first_error_and_all_that_it_had_room_for(tmp_path, mon
         data = bytearray(b"x" * 3)
         assert (whole.write(b"01"), whole.truncate(3), whole.seek(0), whole.readinto(data)) == (2, 3, 0, 3)
         assert (bytes(data), whole.error) == (b"01\0", None)
+        assert (whole.seek(1), whole.readinto(data), bytes(data)) == (1, 2, b"1\0\0")  # up to the end of the file
 
 
 @pytest.mark.parametrize("error", [OSError(5, "Input/output error"), RuntimeError("disk full")])

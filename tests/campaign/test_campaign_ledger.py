@@ -1139,7 +1139,7 @@ def test_damage_to_a_trace_and_a_note_of_the_second_cell_is_named_by_its_keys(pa
     found = verify(path)
     assert (found.checked, found.damaged, found.missing, found.sound) == (0, (), (), False)
     assert found.faults == (
-        "copy 2 of the head: this is no head of microrad: do its chunk again",
+        "copy 2 of the head: this is no head of microrad: resume the campaign",
         "damaged among the traces: (1, 17, 'margin')",
         "damaged among the notes: ('second',)",
     )

@@ -19,7 +19,7 @@ from microrad import link
 from microrad.campaign.optimisation import campaign as optimisation_campaign
 from microrad.campaign.optimisation import search
 from microrad.campaign.optimisation.campaign import _CandidateRows
-from microrad.campaign.optimisation.candidates import Candidate, Kept, Problem, Variable, judged
+from microrad.campaign.optimisation.candidates import Candidate, Kept, Problem, Variable, judged, percent
 from microrad.campaign.optimisation.search import optimise
 from microrad.campaign.records import CampaignError, Interval, Limit
 from microrad.campaign.rows import loops
@@ -27,6 +27,7 @@ from microrad.campaign.rows.evaluator import Evaluator
 from microrad.core import threads as in_threads
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
+from microrad.report.campaign import optimum as words
 from microrad.report.campaign.optimum import fresh_rows_sentence, optimum_data, optimum_text
 
 MARGIN = Limit("margin", 3.0, None, "test")
@@ -658,6 +659,10 @@ def test_bounds_hold_and_wide_ones_are_searched_by_ratio():
         (
             {"confidence": 0.999},
             "optimise.rows: 400 rows cannot tell whether 99.9 % of them keep a limit; draw at least 1000",
+        ),
+        (
+            {"confidence": 0.99999},
+            "optimise.rows: 400 rows cannot tell whether 99.999 % of them keep a limit; draw at least 100000",
         ),
         (
             {"limits": (ANSWER,)},
@@ -1436,3 +1441,24 @@ def test_candidates_are_drawn_in_parts_with_their_values_by_key_from_any_row_on(
     assert sorted(asked) == [(0, k, k + 1) for k in (0, 0, 1, 1, 2, 2)]
     assert [each[:2] for each in made[1:]] == [({}, {"power": 1.0}), ({}, {"power": 2.0})]
     assert made[1][2] is made[2][2] is not None, "what moves no loop shares its runs"
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        (1.0, "100 %"),
+        (0.99999, "99.999 %"),
+        (0.99997, "99.997 %"),
+        (0.999989, "99.9989 %"),
+        (0.98765, "98.77 %"),
+        (0.0, "0 %"),
+        (math.nan, "nan %"),
+    ],
+)
+def test_a_share_that_is_not_all_is_told_from_it(share, words):
+    assert percent(share) == words
+
+
+def test_a_band_of_shares_that_ends_below_all_says_so():
+    kept = Kept(MARGIN, 3.1, 0.1, Interval(0.99997, 0.99991, 0.999995, 0.95))
+    assert words._share_of(kept).endswith(" in 99.997 % (99.991 to 99.9995 %)")

@@ -816,6 +816,7 @@ def test_the_pace_is_that_of_the_rows_done_here(monkeypatch):
     assert pace.words(250, "margin 1 %: 3 dB") == "5 rows/s, 20 s left, margin 1 %: 3 dB"
     assert pace.words(150, "") == "5 rows/s, 0 s left"
     assert pace.seconds == 40.0
+    assert run._Pace(done=150, spent_s=0.0, began_s=109.0, here=1234).words(250, "") == "1230 rows/s, 0 s left"
     assert run._Pace(done=150, spent_s=30.0, began_s=100.0).words(250, "x") == "rows"
     assert run._Pace(done=150, spent_s=30.0, began_s=110.0, here=50).words(250, "x") == "rows"
 

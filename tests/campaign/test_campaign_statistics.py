@@ -488,6 +488,8 @@ def test_what_is_said_of_rows_lost_extrapolated_and_weighted() -> None:
     assert "worth 1 equal ones" in summary._warnings(drawn, cells)[-1]  # the cell that is worth least
     none = CellRows(drawn, 1, [a_chunk(0, [0], [0], margin=[math.nan])])
     assert "worth 4 equal ones" in summary._warnings(drawn, [cells[0], none])[-1]  # not one without a row
+    many = CellRows(drawn, 0, [a_chunk(0, range(1234), margin=[*range(1234)])])
+    assert summary._warnings(drawn, [many])[-1].endswith("are worth 1230 equal ones.")
     even = a_campaign(draws=(SimpleNamespace(drawn_as=None),))
     assert summary._warnings(even, [plain]) == ()
 

@@ -10,7 +10,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from microrad.core import units
-from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_input, format_quantity, parse_quantity
+from microrad.core.units import (
+    PLANCK_J_S,
+    SPEED_OF_LIGHT_M_S,
+    UnitError,
+    format_input,
+    format_limit,
+    format_quantity,
+    parse_quantity,
+)
 from waiting import no_hang
 
 # our symbol: astropy's name for it; photon, bit and cycle are base dimensions in both
@@ -463,3 +471,45 @@ def test_a_refusal_says_the_value_its_fault_what_is_wanted_and_an_example(call, 
 )
 def test_a_quantity_is_written_with_its_prefix_and_as_many_digits_as_it_takes(found, expected):
     assert found() == expected
+
+
+@pytest.mark.parametrize(
+    ("limit", "unit", "digits", "most", "least"),
+    [
+        (387.75e-9, "m", 4, "387.7 nm", "387.8 nm"),
+        (0.01, "Hz", 4, "10 mHz", "10 mHz"),
+        (0.0102343, "Hz", 4, "10.23 mHz", "10.24 mHz"),
+        (-100.0 / 3.0, "V", 4, "-33.34 V", "-33.33 V"),
+        (999.96, "Hz", 4, "999.9 Hz", "1 kHz"),
+        (1000.4, "s", 3, "1000 s", "1010 s"),
+        (0.1 + 0.2, "V", 4, "300 mV", "300 mV"),
+        (0.0, "V", 4, "0 V", "0 V"),
+        (math.inf, "V", 4, "inf V", "inf V"),
+    ],
+)
+def test_a_limit_is_told_on_the_side_that_is_allowed(limit, unit, digits, most, least):
+    assert format_limit(limit, unit, digits) == most
+    assert format_limit(limit, unit, digits, least=True) == least
+
+
+@settings(deadline=None)
+@given(st.floats(1e-12, 1e12) | st.floats(-1e12, -1e-12), st.integers(3, 6))
+def test_what_a_limit_is_told_as_keeps_it(limit, digits):
+    slack = 1e-12 * abs(limit)
+    assert parse_quantity(format_limit(limit, "V", digits), "V") <= limit + 2.0 * slack
+    assert parse_quantity(format_limit(limit, "V", digits, least=True), "V") >= limit - 2.0 * slack
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (1234.0, 3, "1230"),
+        (0.9996, 3, "1"),
+        (75_398.2, 4, "75400"),
+        (12.0, 1, "10"),
+        (2.5e-6, 3, "2.5e-06"),
+        (0, 3, "0"),
+    ],
+)
+def test_a_plain_number_has_no_power_of_ten_where_it_is_large(value, digits, text):
+    assert units.plain(value, digits) == text

@@ -1208,6 +1208,7 @@ def test_a_controller_that_leaves_too_much_is_refused_with_both_figures_unless_a
         ("a */ b /* c", "a * / b / * c"),
         ("a **// b", "a ** // b"),
         ("??/ and \\ end", "? ?/ and / end"),
+        ("a ???/ b ????", "a ? ? ?/ b ? ? ? ?"),
         ("a\nb\tc\x00d", "a b c d"),
         ("", ""),
         ("w " * 70, f"{'w ' * 55}w\n * {'w ' * 13}w"),

@@ -480,7 +480,11 @@ def test_multisines_of_two_inputs_are_sums_of_their_lines_turned_from_realisatio
         (
             lambda: steps(ODD, levels_v=[1.0, 9.5, -6.0, 2.0], dwell_s=0.1, rise_s=0.02),
             "staircase: levels has 9.5 V, outside limits.drive_min to limits.drive_max; would fit: -3.5 V to 9.25 V; "
-            "rise makes the largest step one of 803.5 V/s, limits.slew is 700 V/s; would fit: at least 22.5051 ms",
+            "rise makes the largest step one of 803.5 V/s, limits.slew is 700 V/s; would fit: at least 22.51 ms",
+        ),
+        (
+            lambda: steps(replace(ODD, drive_max_v=9.25004), levels_v=[1.0, 9.5], dwell_s=0.1, rise_s=1.0),
+            "staircase: levels has 9.5 V, outside limits.drive_min to limits.drive_max; would fit: -3.5 V to 9.25004 V",
         ),
         (
             lambda: steps(ODD, levels_v=[1.0, 2.0], dwell_s=7e-4),

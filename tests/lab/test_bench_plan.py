@@ -544,6 +544,16 @@ def test_each_record_of_a_plan_of_two_axes_has_what_is_its_own(tmp_path):
             ],
         ),
         (
+            [('drive_max = "9.5 V"', 'drive_max = "8.9996 V"')],
+            [
+                (
+                    "limits.drive_max",
+                    "is above the range of the converters, -3.5 V to 8.999 V at the drive",
+                    "within -3.5 V to 8.999 V",
+                )
+            ],
+        ),
+        (
             [('drive_max = "9 V"', 'drive_max = "-3 V"')],
             [("limits.drive_max", "is not above drive_min (-3 V)", "a voltage above -3 V")],
         ),

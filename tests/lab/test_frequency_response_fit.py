@@ -720,6 +720,9 @@ def test_what_errors_rest_on_and_what_speaks_against_a_model_is_told_in_full():
     assert frequency_fit._errors_from(True, 6.25, 6.25) == (
         "the standard errors given, times 2.5 for what the model leaves beyond them"
     )
+    assert frequency_fit._errors_from(True, 1.0, 12345.0).endswith("per degree of freedom is 12300")
+    assert frequency_fit._errors_from(True, 1.5e6, 1.0).endswith(" times 1220 for what the model leaves beyond them")
+    assert frequency_fit._misfit(1.5e6)[0].startswith("the model leaves 1220 times the standard errors given: ")
     assert frequency_fit._misfit(6.25) == (
         "the model leaves 2.5 times the standard errors given: the order is too low, the response is not that of a "
         "linear system, or the errors are too small; those of the model are larger by as much.",

@@ -530,6 +530,9 @@ def test_the_order_of_least_criterion_is_chosen_with_what_its_neighbours_would_g
     )
     assert choose(of[1:])[1].endswith("(1 is what a true model leaves)" + reason[reason.index("; order 5") :])
     assert choose(of[:2])[1].endswith("; order 2 is worse by 780; a larger order was not tried")
+    large = [replace(of[0], chi_square=234_567.0, criterion=234_567.0), replace(of[1], criterion=12_345.6)]
+    assert choose(large)[1].startswith("order 3 has the least criterion, 12350 (")
+    assert "by order: 2: 2350, 3: 110 (" in choose(large)[1] and "; order 2 is worse by 222000; " in choose(large)[1]
     assert choose(of[:1]) == (2, choose(of[:1])[1])
     assert choose(of[:1])[1].endswith("by order: 2: 9 (1 is what a true model leaves); a larger order was not tried")
     worse = [of[1], replace(of[2], chi_square=120.0)]

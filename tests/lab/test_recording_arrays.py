@@ -311,7 +311,7 @@ def test_arrays_that_would_fill_the_memory(tmp_path, monkeypatch):
     np.savez_compressed(path, u=np.zeros((40_000, 1, 1, 2), np.int8), y=Y, fs=RATE_HZ)
     monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", 300_000)
     monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_TIMES", 1)
-    assert "'u' states 4e+04 samples, 0.64 MB in a file of" in refusal(path, "u", "y")
+    assert "'u' states 40000 samples, 0.64 MB in a file of" in refusal(path, "u", "y")
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f"real recordings are not at {DATA}")

@@ -886,7 +886,7 @@ def test_numpy_arrays_that_are_no_channel(tmp_path, monkeypatch):
     monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", 100_000)
     monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_TIMES", 1)
     message = refusal(path, "drive", "big", RATE_HZ)
-    assert "'big' states 4e+04 samples, 0.32 MB in a file of 0.0" in message
+    assert "'big' states 40000 samples, 0.32 MB in a file of 0.0" in message
     assert "at most 0.1 MB are unpacked from that; cut out the part that you need" in message
     check(read_recording(path, "drive", "output", RATE_HZ))
 
@@ -1047,8 +1047,8 @@ def odd_hdf5(tmp_path_factory):
             "is packed by the filter 32015, which is none of HDF5's own; pack it with gzip or not at all (h5re",
         ),
         ("twice", "is packed twice over; pack it with gzip"),
-        ("huge", "states 1e+12 samples, 8e+06 MB in a file of 0.0"),
-        ("pieces", "is stored in pieces, each of which states 1e+08 samples, 800 MB in a file of"),
+        ("huge", "states 1000000000000 samples, 8000000 MB in a file of 0.0"),
+        ("pieces", "is stored in pieces, each of which states 100000000 samples, 800 MB in a file of"),
     ],
 )
 def test_datasets_that_are_no_channel(odd_hdf5, name, words):
@@ -1703,8 +1703,8 @@ def test_an_array_that_unpacks_to_too_much_is_told_with_all_its_sizes(tmp_path):
     assert files.most_unpacked(path) == 400_000_000
     assert files.too_large(path, (5_000_000, 10), 8) == ""
     assert files.too_large(path, (3, 40_000_000), 4) == (
-        "states 4e+07 samples, 480 MB in a file of 20 MB, and at most 400 MB are unpacked from that; cut out the part "
-        "that you need, or save it without compression"
+        "states 40000000 samples, 480 MB in a file of 20 MB, and at most 400 MB are unpacked from that; cut out the "
+        "part that you need, or save it without compression"
     )
 
 

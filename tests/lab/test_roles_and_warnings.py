@@ -433,6 +433,10 @@ def test_the_valid_range_is_told_in_full():
         "Not valid above 345.7 V/s, the fastest rate of the recordings: a sine over the whole drive range reaches it "
         "at 11.62 Hz.",
     ]
+    assert warnings.range_warnings((0.0, 2.0), 75_398.2)[1] == (
+        "Not valid above 75400 V/s, the fastest rate of the recordings: a sine over the whole drive range reaches it "
+        "at 12000 Hz."
+    )
 
 
 def test_a_drift_is_told_in_full_for_the_record_that_has_it():

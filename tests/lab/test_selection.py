@@ -1262,3 +1262,8 @@ def test_a_line_has_one_slope_for_all_records_and_an_offset_for_each():
     with pytest.raises(IdentificationError) as caught:
         predictions.predict(SimpleNamespace(units=units), loops[1], 121)
     assert str(caught.value) == "split 121 does not lie within the 120 samples of b; give a number from 2 to that."
+
+
+def test_what_is_judged_over_hours_is_told_in_plain_seconds():
+    found = predictions.Evidence((("slow.csv", 1234.0), ("fast.csv", 0.5)), "fast.csv", 3e-6, 9e-6)
+    assert found.text == "1230 s of 2 recordings, slow.csv (1230 s) and fast.csv (0.5 s)"

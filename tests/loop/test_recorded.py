@@ -211,6 +211,8 @@ def test_a_motion_that_grows_is_not_stationary_for_its_trend():
     fallen = replace(ratio_alone, growth=1.0 / ratio_alone.growth)
     assert fallen.verdict == ratio_alone.verdict.replace("grows", "falls")
     assert replace(fallen, growth=0.9).verdict == ""
+    assert " falls 1230 times " in replace(fallen, growth=1.0 / 1234.0).verdict
+    assert " differs 4320 times, and " in replace(found.fast, ratio=4321.0).verdict
 
 
 @pytest.mark.promise("pointing-67")
@@ -438,6 +440,9 @@ def test_other_orders_rates_and_lengths_are_refused(small, monkeypatch):
     refuse_short(small, 10.0)
     with pytest.raises(ValueError, match=r'"small" lasts 20 s; the loop settles in 19 s, and ten times the .* record'):
         refuse_short(small, 19.0)
+    long = replace(small, correlation_s=0.004)
+    with pytest.raises(ValueError, match=r"are needed behind that: record 30\.1 s or more$"):  # 30.04 s
+        refuse_short(long, 30.0)
     unstable = LOOP.assembled(Controller.pid(0.0, 1e8, rate_hz=2000.0))
     with pytest.raises(ValueError, match="is unstable: a pole at"):
         recorded_residual(LOOP.parts, unstable, small, 0.0)
@@ -490,7 +495,7 @@ MOVING = np.sin(0.37 * np.arange(400.0)) + 0.01 * np.arange(400.0)
             ValueError,
             (
                 '"tracker": 400 samples, 0.001 s apart, are not played every 2e-08 s: rates may differ '
-                "10000 times, and 5e+07 steps are the most; cut the recording"
+                "10000 times, and 50000000 steps are the most; cut the recording"
             ),
         ),
         (

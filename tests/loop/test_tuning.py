@@ -635,3 +635,10 @@ def test_of_designs_for_larger_margins_that_hold_the_one_that_leaves_least_is_ta
     assert promises.firmer(0.4, lambda margin: tuned(margin, 2.0), judged)[0] == 0.88
     assert promises.firmer(0.4, lambda margin: tuned(margin, 0.0), None) is None
     assert promises.firmer(0.4, lambda margin: 0.76, judged) is None
+
+
+def test_the_parameters_of_a_trial_are_told_in_plain_numbers():
+    search = SimpleNamespace(
+        parameters=[SimpleNamespace(name="ki", unit="V/(rad s)"), SimpleNamespace(name="n", unit="")]
+    )
+    assert tuning._with(search, SimpleNamespace(values=[123_456.0, 2.5])) == "ki 123500 V/(rad s), n 2.5"

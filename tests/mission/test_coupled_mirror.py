@@ -997,6 +997,14 @@ ALL_OF_SEVERAL_AXES = {
         kHz): expected at most 1.25 kHz
         """,
     ),
+    "a recording at a rate of many digits, beyond half of it": (
+        lambda: made(RecordingTable, excited_from_hz=1.0, excited_to_hz=1300.0, rate_hz=2501.4).problems(),
+        """excited_to is above half the rate (1.25 kHz): expected at most 1.25 kHz""",
+    ),
+    "a bias out of a range of five digits": (
+        lambda: made(ActuatorTable, drive_min_v=-2.5004, drive_max_v=99.996, bias_v=100.0).problems(),
+        """bias is outside drive_min to drive_max (-2.5004 V to 99.996 V): expected -2.5004 V to 99.996 V""",
+    ),
     "modes that grow, and too few frequencies": (
         lambda: made(ModesTable, decay_1_s=(5.0, 0.0, -2.5), frequency_rad_s=(40.0, 0.0)).problems(),
         """

@@ -642,6 +642,26 @@ ALL_OF_A_DAY = {
         at least 61.5 s; relays holds no relay: expected a table such as [constellation.relays.east]
         """,
     ),
+    "sessions with times of five digits": (
+        lambda: made(
+            Constellation,
+            pattern="star",
+            satellites=12,
+            planes=4,
+            phasing=0,
+            file="a.tle",
+            overhead_s=100.04,
+            shortest_s=100.04,
+            session_s=100.0,
+            relays={},
+            stations={},
+        ).problems(),
+        """
+        file does not belong to pattern = "star": expected this line removed; shortest is not above overhead: such a
+        session would carry no data: expected more than 100.04 s; session is below shortest: expected at least 100.04
+        s; relays holds no relay: expected a table such as [constellation.relays.east]
+        """,
+    ),
     "a constellation whose second station is a relay": (
         lambda: made(
             Constellation,

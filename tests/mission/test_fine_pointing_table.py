@@ -803,6 +803,12 @@ ALL_OF_A_LOOP = {
         duration leaves no control sample behind settle: expected a longer run: duration = "2.82 s" would do
         """,
     ),
+    "a long run without a sample behind the settling": (
+        lambda: clocked(settle_s=2499.99999, duration_s=2500.0).problems(),
+        """
+        duration leaves no control sample behind settle: expected a longer run: duration = "2501 s" would do
+        """,
+    ),
     "a filter and a body that are too fast": (
         lambda: clocked(reference_filter_hz=3125.0, body=SimpleNamespace(bandwidth_hz=12500.0)).problems(),
         """

@@ -634,6 +634,13 @@ ALL_OF_A_LINK = {
         the wavelength (260 nm): such a beam has no core to point: expected at most 260 nm
         """,
     ),
+    "a beam whose limit has five digits, told so that it is kept": (
+        lambda: made(Beam, wavefront_error_m=390e-9, wavelength_m=1.551e-6).problems(),
+        """
+        wavefront_error is above a quarter of the wavelength (387.7 nm): such a beam has no core to point: expected at
+        most 387.7 nm
+        """,
+    ),
     "a beam of no quality": (
         lambda: made(Beam, wavelength_m=1.04e-6).problems(),
         """strehl is missing, and so is wavefront_error: expected strehl = 0.4 would do""",
@@ -821,6 +828,13 @@ ALL_OF_A_LINK = {
         coupling.astigmatism is above half the wavelength (770 nm): such light has no core to couple: expected at
         most 770 nm; coupling.coma is above half the wavelength (770 nm): such light has no core to couple: expected
         at most 770 nm
+        """,
+    ),
+    "light without a core, of a wavelength of six digits": (
+        lambda: made(Coupling, coma_m=0.8e-6).wavefront_problems(1.55038e-6),
+        """
+        coupling.coma is above half the wavelength (775.1 nm): such light has no core to couple: expected at most 775.1
+        nm
         """,
     ),
     "a code that gains more than any": (
@@ -1034,8 +1048,8 @@ ALL_OF_A_LINK = {
             SimpleNamespace(outage=0.01),
         ),
         """
-        communication.coupling.angular_error turns the fibre's mode out of the aperture: beyond 871.7 mrad it takes
-        no light to speak of: expected at most 871.7 mrad
+        communication.coupling.angular_error turns the fibre's mode out of the aperture: beyond 871.6 mrad it takes
+        no light to speak of: expected at most 871.6 mrad
         """,
     ),
     "two point-aheads": (

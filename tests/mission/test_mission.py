@@ -380,25 +380,25 @@ def test_a_bias_outside_the_amplifier_names_both(refuse):
     [
         ("mirror.bias", '"13 V"', "mirror.bias", "is outside drive_min to drive_max (0 V to 12 V)"),
         ("mirror.drive_min", '"9 V"', "mirror.bias", "is outside drive_min to drive_max (9 V to 12 V)"),
-        ("mirror.bouc_wen.alpha", '"34.635 1/V"', "mirror.bouc_wen.alpha", "not above the size of beta (34.63 1/V)"),
+        ("mirror.bouc_wen.alpha", '"34.635 1/V"', "mirror.bouc_wen.alpha", "not above the size of beta (34.64 1/V)"),
         ("mirror.drive_max", '"-1 V"', "mirror.drive_max", "is not above drive_min (0 V)"),
         (
             "mirror.bouc_wen.alpha",
             '"34 1/V"',
             "mirror.bouc_wen.alpha",
-            "not above the size of beta (34.63 1/V), so h would grow without bound",
+            "not above the size of beta (34.64 1/V), so h would grow without bound",
         ),
         (
             "mirror.bouc_wen.beta",
             '"34.635 1/V"\ngamma = "5 1/V"',
             "mirror.bouc_wen.alpha",
-            "not above the size of what beta, gamma and eta take off it (39.63 1/V), so h would grow without bound",
+            "not above the size of what beta, gamma and eta take off it (39.64 1/V), so h would grow without bound",
         ),
         (
             "mirror.bouc_wen.beta",
             '"34.635 1/V"\neta = "-4 1/V"',
             "mirror.bouc_wen.alpha",
-            "not above the size of what beta, gamma and eta take off it (38.63 1/V), so h would grow without bound",
+            "not above the size of what beta, gamma and eta take off it (38.64 1/V), so h would grow without bound",
         ),
         ("mirror.bouc_wen.beta", '"34.635 1/V"\nexponent = 0.9', "mirror.bouc_wen.exponent", "below 1"),
         ("mirror.bouc_wen.beta", '"34.635 1/V"\nexponent = 101', "mirror.bouc_wen.exponent", "above 100"),
@@ -1248,6 +1248,28 @@ ALL_OF_A_MIRROR = {
         V to 60 V
         """,
     ),
+    "a bias out of a reach that is no round number": (
+        lambda: _bias_fits(
+            SimpleNamespace(bias_v=70.0), SimpleNamespace(output_min_v=-100.0, output_max_v=200.0, gain=3.0)
+        ),
+        """
+        mirror.bias is outside amplifier.output_min to amplifier.output_max divided by amplifier.gain: expected -33.33
+        V to 66.66 V
+        """,
+    ),
+    "sines too slow and too fast for a rate of many digits": (
+        lambda: _frequencies_fit(
+            SimpleNamespace(rate_hz=20468.6),
+            SimpleNamespace(
+                pid_frequencies_hz=(0.01, 3.0), inverse_frequencies_hz=(1.0, 12e3), loop_frequencies_hz=(1.0, 2.0)
+            ),
+        ),
+        """
+        scenario.pid_frequencies begins at 10 mHz, a period of over 2000000 control samples: expected frequencies of at
+        least 10.24 mHz; scenario.inverse_frequencies reaches 12 kHz, but half of control.rate is 10.23 kHz: expected
+        frequencies below 10.23 kHz
+        """,
+    ),
     "sines too slow and too fast": (
         lambda: _frequencies_fit(
             SimpleNamespace(rate_hz=2e4),
@@ -1282,6 +1304,19 @@ ALL_OF_A_MIRROR = {
         the mirror; denominator begins with 0: expected the highest power of s first, with a factor other than 0;
         numerator is zero throughout: expected at least one coefficient other than 0; excited_to is not above
         excited_from: expected a band that goes up
+        """,
+    ),
+    "a band of five digits, told with all of them": (
+        lambda: made(
+            LinearPart,
+            numerator=(1.0,),
+            denominator=(1.0, 1.0),
+            excited_from_hz=2.0004,
+            normalise_at_hz=1.0,
+            excited_to_hz=4500.4,
+        ).problems(),
+        """
+        normalise_at is outside excited_from to excited_to (2.0004 Hz to 4.5004 kHz): expected 2.0004 Hz to 4.5004 kHz
         """,
     ),
     "coefficients of as high an order above": (

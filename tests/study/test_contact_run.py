@@ -760,7 +760,7 @@ def test_a_mission_without_what_a_contact_needs_is_refused(file, run, finding):
         run(contact(), settings(), finding=odd)
     with pytest.raises(ValueError, match=r"window_s of a contact run is 50 µs, less than a control period \(200 µs\)"):
         run(contact(), settings(window_s=5e-5, hold_s=0.0))
-    with pytest.raises(ValueError, match=r"1000 windows of 2 s .* 1e\+07 control samples .* at most 5e\+06"):
+    with pytest.raises(ValueError, match=r"1000 windows of 2 s .* 10000000 control samples .* at most 5000000"):
         run(contact(), settings(windows=1000, window_s=2.0))
     beam = file.mission.communication.model_copy(update={"data_rate_bit_s": math.nan})
     with pytest.raises(ValueError, match='"largest" has to be solved for first'):
@@ -848,7 +848,7 @@ def test_windows_hold_a_sample_each_and_no_more_together_than_memory_does(sample
     monkeypatch.setattr(drawn_windows, "MOST_SAMPLES", samples)
     assert replace(made).settings == made.settings
     monkeypatch.setattr(drawn_windows, "MOST_SAMPLES", samples - 1)
-    with pytest.raises(ValueError, match=r"^4 windows of 400 ms hold 8e\+03 control samples of a contact run"):
+    with pytest.raises(ValueError, match=r"^4 windows of 400 ms hold 8000 control samples of a contact run"):
         replace(made)
     short = settings(window_s=0.6 * period, hold_s=0.0)
     assert replace(made, settings=replace(short, windows=1)).settings.window_s == 0.6 * period

@@ -228,7 +228,8 @@ class _Disk(io.FileIO):
         count = super().readinto(data)
         if self.error is not None and count < len(data):
             data[count:] = bytes(len(data) - count)
-        return len(data)
+            return len(data)
+        return count
 
 
 def _extent(ledger: Ledger, fields: list[_Field]) -> tuple[int, dict[str, int]]:

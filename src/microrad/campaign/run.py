@@ -207,7 +207,7 @@ class _Pace:
             return "rows"
         rate = self.here / took
         left = (total - self.done) / rate
-        return ", ".join(part for part in (f"{rate:.3g} rows/s", f"{_minutes(left)} left", shown) if part)
+        return ", ".join(part for part in (format_quantity(rate, "rows/s", 3), f"{_minutes(left)} left", shown) if part)
 
 
 def _minutes(seconds: float) -> str:

@@ -96,7 +96,7 @@ def _text(
     marks: Sequence[str],
     warnings: Sequence[str],
 ) -> str:
-    from microrad.core.units import format_quantity
+    from microrad.core.units import format_quantity, plain
     from microrad.report.tables import Table, tables_text
 
     mirror = scene.mirror.mirror
@@ -123,7 +123,7 @@ def _text(
         scene.reach_v,
     )
     drives = [
-        (actuator.name, f"{known:.3g}", f"{rms:.3g}", f"{reach_share_percent(known, rms, scene.reach_v):.3g} %")
+        (actuator.name, f"{known:.3g}", f"{rms:.3g}", f"{plain(reach_share_percent(known, rms, scene.reach_v))} %")
         for actuator, known, rms in zip(scene.mirror.actuators, scene.static_v, best.drive_v.tolist(), strict=True)
     ]
     reach = f"{min(high, -low):.4g} V"

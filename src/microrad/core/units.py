@@ -321,7 +321,17 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
     rounded = float(f"{value:.{digits}g}")
     prefix = _prefix(abs(rounded), re.split("[ /]", unit, maxsplit=1)[0])
     scaled = value / float(_PREFIXES[prefix]) if prefix else value
-    return f"{float(f'{scaled:.{digits}g}'):.15g} {prefix}{unit}".rstrip()
+    return f"{plain(scaled, digits)} {prefix}{unit}".rstrip()
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A number in words, without a power of ten where it is large: "1230".
+
+    Args:
+        value: The number.
+        digits: Significant digits.
+    """
+    return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
 def format_input(value: float, unit: str) -> str:
@@ -335,6 +345,22 @@ def format_input(value: float, unit: str) -> str:
         (n for n in range(4, _MOST_GIVEN + 1) if math.isclose(float(f"{value:.{n}g}"), value, rel_tol=1e-14)), 4
     )
     return format_quantity(value, unit, given)
+
+
+def format_limit(limit: float, unit: str, digits: int = 4, *, least: bool = False) -> str:
+    """A limit in words, rounded to the side on which it is kept: what is told to be allowed is allowed.
+
+    Args:
+        limit: The limit in the SI unit.
+        unit: The SI unit.
+        digits: Significant digits.
+        least: Whether it is the least that is allowed, which is rounded up; the most is rounded down.
+    """
+    rounded = float(f"{limit:.{digits}g}")
+    side = 1.0 if least else -1.0
+    if side * (limit - rounded) > 1e-12 * abs(limit):
+        rounded += side * 10.0 ** (math.floor(math.log10(abs(limit))) + 1 - digits)
+    return format_quantity(rounded, unit, digits)
 
 
 def _prefix(magnitude: float, symbol: str) -> str:

@@ -102,9 +102,10 @@ def comment(text: str, prefix: str = "") -> str:
         text: The text, with any characters.
         prefix: What each line but the first begins with.
     """
-    plain = "".join(c if c.isprintable() else " " for c in text).replace("\\", "/").replace("??", "? ?")
-    while "*/" in plain or "/*" in plain:
-        plain = plain.replace("*/", "* /").replace("/*", "/ *")
+    plain = "".join(c if c.isprintable() else " " for c in text).replace("\\", "/")
+    for pair in ("??", "*/", "/*"):
+        while pair in plain:
+            plain = plain.replace(pair, " ".join(pair))
     return f"\n{prefix}".join(textwrap.wrap(plain, LINE) or [""])
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input, format_limit, format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Table
 from microrad.mission.ground import GroundPath, ground_fits, path_of, range_of
 from microrad.mission.tables.acquisition import Acquisition
@@ -126,7 +126,7 @@ class Amplifier(Table):
     def problems(self) -> Iterator[Problem]:
         """An output range that goes up."""
         if not self.output_min_v < self.output_max_v:
-            low = format_quantity(self.output_min_v, "V")
+            low = format_input(self.output_min_v, "V")
             yield Problem("output_max", f"is not above output_min ({low})", f"a voltage above {low}")
 
 
@@ -172,19 +172,20 @@ class Scenario(Table):
 def _bias_fits(mirror: Mirror, amplifier: Amplifier) -> Iterator[Problem]:
     low, high = amplifier.output_min_v / amplifier.gain, amplifier.output_max_v / amplifier.gain
     if not low <= mirror.bias_v <= high:
-        span = f"{format_quantity(low, 'V')} to {format_quantity(high, 'V')}"
+        span = f"{format_limit(low, 'V', least=True)} to {format_limit(high, 'V')}"
         reason = "is outside amplifier.output_min to amplifier.output_max divided by amplifier.gain"
         yield Problem("mirror.bias", reason, span)
 
 
 def _frequencies_fit(control: Control, scenario: Scenario) -> Iterator[Problem]:
-    half = format_quantity(control.rate_hz / 2, "Hz")
+    half = format_limit(control.rate_hz / 2, "Hz")
     for name in ("pid_frequencies", "inverse_frequencies", "loop_frequencies"):
         lowest, highest = getattr(scenario, f"{name}_hz")[0], getattr(scenario, f"{name}_hz")[-1]
         slowest = control.rate_hz / MOST_SAMPLES
         if lowest < slowest:
             reason = f"begins at {format_quantity(lowest, 'Hz')}, a period of over {MOST_SAMPLES} control samples"
-            yield Problem(f"scenario.{name}", reason, f"frequencies of at least {format_quantity(slowest, 'Hz')}")
+            advice = f"frequencies of at least {format_limit(slowest, 'Hz', least=True)}"
+            yield Problem(f"scenario.{name}", reason, advice)
         if highest >= control.rate_hz / 2:
             reason = f"reaches {format_quantity(highest, 'Hz')}, but half of control.rate is {half}"
             yield Problem(f"scenario.{name}", reason, f"frequencies below {half}")
@@ -224,7 +225,7 @@ def _coupling_fits(
         off = of_aperture if given else 1.121 * 2.0 * c.focal_length_m / terminals.geo_aperture_m
         most = math.atan(8.0 / off)
         if c.angular_error_rad > most:
-            limit = format_quantity(most, "rad")
+            limit = format_limit(most, "rad")
             reason = f"turns the fibre's mode out of the aperture: beyond {limit} it takes no light to speak of"
             yield Problem("communication.coupling.angular_error", reason, f"at most {limit}")
     if c.is_random and requirement.outage is None:

@@ -3,6 +3,7 @@
 import math
 import re
 
+from microrad.core import units
 from microrad.core.units import format_quantity
 from microrad.link.radial_error import SMALLEST_PROBABILITY
 
@@ -71,13 +72,13 @@ def minus(text: str) -> str:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """A number without a power of ten, however large.
+    """A number without a power of ten, however large, with the sign of prose.
 
     Args:
         value: any.
         digits: significant ones.
     """
-    return minus(f"{float(f'{value:.{digits}g}'):.15g}")
+    return minus(units.plain(value, digits))
 
 
 def power_text(number: float, digits: int = 3) -> str:

@@ -246,7 +246,7 @@ class DaskEngine:
             client = distributed.Client(self.address, timeout=_CONNECT_S, set_as_default=False)
             client.subscribe_topic(self._topic, self._hear)
             return client
-        except (OSError, ValueError, TimeoutError, AssertionError) as error:  # the last: its own loop did not start
+        except Exception as error:  # of many kinds: an address without its certificate or package, no loop of its own
             self._clock.close()
             self._undo_quiet()
             raise CampaignError(
@@ -387,13 +387,16 @@ class DaskEngine:
         self._flights[serial] = Flight(job)
         key = f"{self._topic}-{serial}"
         arguments = (self._name, self._topic, serial, tuple(job), beat_every_s(self._late_s))
-        future = self._client.submit(do, *arguments, key=key, pure=False, priority=-serial)
+        try:
+            future = self._client.submit(do, *arguments, key=key, pure=False, priority=-serial)
+        except Exception as error:  # as of a client that has closed
+            raise self._gone(words(error)) from None
         self._futures[serial] = future
         future.add_done_callback(lambda _: self._ended.put(serial))
 
     def _drop(self, serial: int) -> Flight:
         """Have nothing more to do with a job under way."""
-        future = self._futures.pop(serial)
+        future = self._futures.pop(serial, None)
         with suppress(Exception):
             if future.status == "pending":
                 future.cancel(force=True)

@@ -202,9 +202,9 @@ def _check_sizes(table: list[tuple[str, list[int], int, int]]) -> None:
 def _check(kind: str, data: bytes) -> None:
     """Raises `CampaignError` if these are not whole bytes of this version and kind; a damaged ledger may give text."""
     if not isinstance(data, bytes) or len(data) < _PREFIX.size + _DIGEST or not data.startswith(_MAGIC):
-        raise CampaignError(f"this is no {kind} of microrad: do its chunk again")
+        raise CampaignError(f"this is no {kind} of microrad: resume the campaign")
     if hashlib.sha256(memoryview(data)[:-_DIGEST]).digest() != data[-_DIGEST:]:
-        raise CampaignError(f"a {kind} of {len(data)} bytes is damaged, its checksum differs: do its chunk again")
+        raise CampaignError(f"a {kind} of {len(data)} bytes is damaged, its checksum differs: resume the campaign")
     _, version, number, _ = _PREFIX.unpack_from(data)
     if version != VERSION:
         raise CampaignError(f"a {kind} has format {version}, and this microrad reads {VERSION}: use the same microrad")

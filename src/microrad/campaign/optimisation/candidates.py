@@ -4,6 +4,7 @@ The share of rows that keep a limit moves in steps, so a candidate is judged by 
 ordered by how far they are inside the limit, the first that may not miss it any more.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,8 +156,9 @@ def _check_rows(problem: Problem, rows: int) -> None:
 
 
 def percent(share: float) -> str:
-    """A share as it stands in messages."""
-    return f"{100.0 * share:.4g} %"
+    """A share as it stands in messages: one that is not all of it is told from it."""
+    digits = max(4, 1 - math.floor(math.log10(1.0 - share))) if share < 1.0 else 4
+    return f"{100.0 * share:.{digits}g} %"
 
 
 def quantity_text(value: float, unit: str) -> str:

@@ -139,7 +139,7 @@ class CellRows:
             return ""
         unit = "rad" if wanted.output == RADIUS else OUTPUTS[wanted.output].unit
         value, low, high, half = (
-            "unknown" if math.isnan(x) else format_quantity(x, unit, 4) if unit else f"{x:.4g}"
+            "unknown" if math.isnan(x) else format_quantity(x, unit).rstrip()
             for x in (found.value, found.low, found.high, self.campaign.half_width)
         )
         where = "".join(f" with {key} = {text}" for key, text in self.cell.values.items())

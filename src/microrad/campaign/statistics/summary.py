@@ -16,6 +16,7 @@ from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.core.arrays import Floats
+from microrad.core.units import plain
 from microrad.mirror import Variant
 
 SAMPLE_ROWS = 4000
@@ -142,7 +143,7 @@ def _warnings(campaign: CampaignFile, cells: Sequence[CellRows]) -> tuple[str, .
         worth = min((cell.worth for cell in cells if cell.rows > cell.failed), default=math.nan)
         found.append(
             "Some inputs are drawn from another distribution than their own and weighted back: for a mean the rows are "
-            f"worth {worth:.3g} equal ones."
+            f"worth {plain(worth)} equal ones."
         )
     return tuple(found)
 

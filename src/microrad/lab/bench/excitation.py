@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from microrad.core.arrays import Floats, Integers
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input, format_limit, format_quantity
 from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
 
@@ -119,10 +119,10 @@ def logarithmic_chirp(
     samples = samples_in(limits, name, "duration", duration_s)
     if not start_hz < stop_hz:
         raise DesignError(
-            name, Problem("stop", "is not above start", f"a frequency above {format_quantity(start_hz, 'Hz')}")
+            name, Problem("stop", "is not above start", f"a frequency above {format_input(start_hz, 'Hz')}")
         )
     if start_hz * duration_s < _LEAST_TURN:
-        least = _rounded(_LEAST_TURN / start_hz, "s", up=True)
+        least = format_limit(_LEAST_TURN / start_hz, "s", least=True)
         reason = f"holds less than a thousandth of a period of {format_quantity(start_hz, 'Hz')}"
         raise DesignError(name, Problem("duration", reason, f"at least {least}, or a higher start"))
     growth = math.log(stop_hz / start_hz) / duration_s
@@ -287,7 +287,7 @@ def samples_in(limits: Limits, name: str, key: str, seconds: float) -> int:
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
     if seconds > most:
         reason = f"makes a record of {format_quantity(seconds, 's')} at {format_quantity(limits.rate_hz, 'Hz')}"
-        expected = f"at most {_rounded(most, 's')} ({MOST_SAMPLES / 1e6:g} million samples), or a lower rate"
+        expected = f"at most {format_limit(most, 's')} ({MOST_SAMPLES / 1e6:g} million samples), or a lower rate"
         raise DesignError(name, Problem(key, reason, expected))
     return max(round(seconds * limits.rate_hz), 1)
 
@@ -300,7 +300,7 @@ def _too_fast(limits: Limits, key: str, highest_hz: float) -> list[Problem]:
         f"reaches {format_quantity(highest_hz, 'Hz')}, {limits.rate_hz / highest_hz:.3g} samples a period at "
         f"{format_quantity(limits.rate_hz, 'Hz')} where limits.samples_per_period asks for {fewest:g}"
     )
-    most, rate = _rounded(limits.rate_hz / fewest, "Hz"), _rounded(highest_hz * fewest, "Hz", up=True)
+    most, rate = format_limit(limits.rate_hz / fewest, "Hz"), format_limit(highest_hz * fewest, "Hz", least=True)
     return [Problem(key, reason, f"at most {most}, or a rate of at least {rate}")]
 
 
@@ -323,23 +323,16 @@ def _fitted(
             reached = base - size * part if limit.endswith("min") else base + size * part
             allowed = base - space if limit.endswith("min") else base + space
             reason = f"takes the drive to {format_quantity(reached, unit)}, {limit} is {format_quantity(allowed, unit)}"
-            found.append(Problem(key, reason, f"at most {_rounded(most, 'V')}"))
+            found.append(Problem(key, reason, f"at most {format_limit(most if most > _NOTHING else 0.0, 'V')}"))
     if found:
         raise DesignError(name, *found)
     return offset_v + size * shape
 
 
-def _rounded(value: float, unit: str, *, up: bool = False) -> str:
-    """The last value of four digits that a limit allows, in words: below it, or above."""
-    digits = 10.0 ** (3 - math.floor(math.log10(value))) if value > _NOTHING else 1.0
-    found = math.ceil(value * digits * (1 - _ROUNDING)) if up else math.floor(value * digits * (1 + _ROUNDING))
-    return format_quantity(found / digits, unit)
-
-
 def _outside(limits: Limits, key: str, levels: Floats) -> list[Problem]:
     slack = _ROUNDING * (limits.drive_max_v - limits.drive_min_v)
     bad = levels[(levels < limits.drive_min_v - slack) | (levels > limits.drive_max_v + slack)]
-    span = f"{format_quantity(limits.drive_min_v, 'V')} to {format_quantity(limits.drive_max_v, 'V')}"
+    span = f"{format_input(limits.drive_min_v, 'V')} to {format_input(limits.drive_max_v, 'V')}"
     reason = (
         f"has {format_quantity(float(bad[0]), 'V')}, outside limits.drive_min to limits.drive_max" if bad.size else ""
     )
@@ -352,7 +345,7 @@ def _too_steep(limits: Limits, rise: int, levels: Floats) -> list[Problem]:
     if slew <= limits.slew_v_s * (1 + _ROUNDING):
         return []
     fewest = min(largest / limits.slew_v_s * limits.rate_hz, 1e15)
-    needed = format_quantity(math.ceil(fewest - _WHOLE) / limits.rate_hz, "s", 6)
+    needed = format_limit(math.ceil(fewest - _WHOLE) / limits.rate_hz, "s", least=True)
     shown, most = format_quantity(slew, "V/s"), format_quantity(limits.slew_v_s, "V/s")
     return [Problem("rise", f"makes the largest step one of {shown}, limits.slew is {most}", f"at least {needed}")]
 

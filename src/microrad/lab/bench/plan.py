@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from microrad.core.units import UnitError, format_quantity
+from microrad.core.units import UnitError, format_input, format_limit
 from microrad.lab.bench.excitation import (
     DesignError,
     Excitation,
@@ -85,7 +85,7 @@ class LimitsTable(Table):
     def problems(self) -> Iterator[Problem]:
         """The range must go up."""
         if not self.drive_min_v < self.drive_max_v:
-            low = format_quantity(self.drive_min_v, "V")
+            low = format_input(self.drive_min_v, "V")
             yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
 
 
@@ -105,7 +105,7 @@ class ConvertersTable(Table):
             ("output", self.output_min_rad, self.output_max_rad, "rad"),
         ):
             if not low < high:
-                yield Problem(f"{name}_max", f"is not above {name}_min", f"above {format_quantity(low, unit)}")
+                yield Problem(f"{name}_max", f"is not above {name}_min", f"above {format_input(low, unit)}")
 
 
 class SensorTable(Table):
@@ -304,7 +304,7 @@ class PlanTable(Table):
             ("the amplifier", amplifier.output_min_v / amplifier.gain, amplifier.output_max_v / amplifier.gain),
         )
         for what, low, high in ranges:
-            span = f"{format_quantity(low, 'V')} to {format_quantity(high, 'V')}"
+            span = f"{format_limit(low, 'V', least=True)} to {format_limit(high, 'V')}"
             if limits.drive_min_v < low:
                 yield Problem(
                     "limits.drive_min", f"is below the range of {what}, {span} at the drive", f"within {span}"

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from microrad.core.folder import read_bytes
+from microrad.core.units import plain
 from microrad.lab.recording.records import RecordingError
 
 MAX_BYTES = 2_000_000_000
@@ -103,9 +104,9 @@ def too_large(path: Path, shape: Sequence[int], itemsize: int) -> str:
     if size <= most:
         return ""
     return (
-        f"states {max(shape):.4g} samples, {size / 1e6:.4g} MB in a file of {path.stat().st_size / 1e6:.3g} MB, and at "
-        f"most {most / 1e6:.4g} MB are unpacked from that; cut out the part that you need, or save it without "
-        "compression"
+        f"states {plain(max(shape), 4)} samples, {plain(size / 1e6, 4)} MB in a file of "
+        f"{plain(path.stat().st_size / 1e6)} MB, and at most {plain(most / 1e6, 4)} MB are unpacked "
+        "from that; cut out the part that you need, or save it without compression"
     )
 
 

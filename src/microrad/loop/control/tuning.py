@@ -9,6 +9,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
+from microrad.core.units import plain
 from microrad.loop.control.analysis import LoopMargins, close, h2, loop_margins
 from microrad.loop.control.descent import MODELS, descend, settle
 from microrad.loop.control.problem import RESIDUAL, AxisController, DesignPlant, Family, Specification
@@ -293,7 +294,7 @@ def _named(search: Search, trial: Trial) -> dict[str, float]:
 
 def _with(search: Search, trial: Trial) -> str:
     named = zip(search.parameters, trial.values, strict=True)
-    return ", ".join(f"{p.name} {v:.4g} {p.unit}".rstrip() for p, v in named)
+    return ", ".join(f"{p.name} {plain(v, 4)} {p.unit}".rstrip() for p, v in named)
 
 
 def _everywhere(search: Search) -> str:

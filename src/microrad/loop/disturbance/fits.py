@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats, reals
-from microrad.core.units import LEAST, format_quantity
+from microrad.core.units import LEAST, format_quantity, plain
 from microrad.loop.disturbance.records import Convention, Disturbance, above_zero, band_rms, one_input, rising, share
 from microrad.loop.disturbance.sources import from_terms
 from microrad.loop.disturbance.tables import checked
@@ -80,7 +80,7 @@ def _refuse_poor_bands(fit: Fit, name: str) -> None:
     worst = int(np.argmax(np.abs(ratio - 1.0)))
     if abs(ratio[worst] - 1.0) > _BAND:
         raise ValueError(
-            f'"{name}": no filter of a few terms has these rms values; the nearest has {ratio[worst]:.3g} times the '
+            f'"{name}": no filter of a few terms has these rms values; the nearest has {plain(ratio[worst])} times the '
             f"given rms between {fit.edges_hz[worst]:g} and {fit.edges_hz[worst + 1]:g} Hz, and {100 * _BAND:g} % is "
             "allowed: a density cannot fall faster than 1/f^4 from one band to the next; merge bands or give a table"
         )
@@ -165,7 +165,7 @@ def _refuse_poor_table(fit: Fit, name: str) -> None:
     ratio = float(np.linalg.norm(fit.achieved_rms_rad) / np.linalg.norm(fit.requested_rms_rad))
     if abs(ratio - 1.0) > _TOTAL:
         raise ValueError(
-            f'"{name}": the best filter of a few terms has {ratio:.3g} times the rms of the table, and '
+            f'"{name}": the best filter of a few terms has {plain(ratio)} times the rms of the table, and '
             f"{100 * _TOTAL:g} % is allowed; give the table more finely where it is high"
         )
 

@@ -115,7 +115,7 @@ def resampled(motion: RecordedMotion, step_s: float) -> Floats:
     if not 1.0 / _MOST_APART <= ratio <= _MOST_APART or motion.samples_rad.size * ratio > _MOST_STEPS:
         raise ValueError(
             f'"{motion.name}": {motion.samples_rad.size} samples, {motion.step_s:g} s apart, are not played every '
-            f"{step_s:g} s: rates may differ {_MOST_APART:g} times, and {_MOST_STEPS:g} steps are the most; cut the "
+            f"{step_s:g} s: rates may differ {_MOST_APART:g} times, and {_MOST_STEPS} steps are the most; cut the "
             "recording"
         )
     share = _in_whole_numbers(ratio)

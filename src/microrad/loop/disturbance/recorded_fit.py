@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from microrad.core.arrays import Floats
+from microrad.core.units import plain
 from microrad.loop.disturbance.recorded import PARTS, RecordedMotion, density, recorded_motion
 from microrad.loop.disturbance.recorded_lines import find_lines
 from microrad.loop.disturbance.recorded_tests import (
@@ -101,8 +102,8 @@ def fit_recording(
     _, band_limited, terms, worst_db, at_hz = min(found, key=lambda each: each[:2])
     filtered, states = one_input(from_terms(terms, name, "", "recorded")), states_of(terms)
     basis = (
-        f"fit of {states} states and {len(lines)} lines to {motion.duration_s:.4g} s; worst {worst_db:+.2f} dB near "
-        f"{at_hz:.4g} Hz"
+        f"fit of {states} states and {len(lines)} lines to {plain(motion.duration_s, 4)} s; worst {worst_db:+.2f} dB "
+        f"near {plain(at_hz, 4)} Hz"
     )
     spectrum = _spectrum(filtered, motion, band_limited)
     residual = one_step_residual(spectrum, rest, step_s)

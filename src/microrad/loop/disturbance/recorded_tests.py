@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import plain
 
 BY_CHANCE = 1e-3
 """Probability below which what is seen is no chance."""
@@ -58,12 +59,12 @@ class BlockTest:
         """Why the motion is not stationary, "" where it is."""
         if self.ratio_p < BY_CHANCE and self.ratio > WORTH_SAYING**2:
             return (
-                f"the variance of {self.of} in {_BLOCKS} equal parts differs {self.ratio:.3g} times, and stationary "
-                f"motion of this spectrum stays within {self.usual:.3g} times"
+                f"the variance of {self.of} in {_BLOCKS} equal parts differs {plain(self.ratio)} times, and stationary "
+                f"motion of this spectrum stays within {plain(self.usual)} times"
             )
         if self.growth_p < BY_CHANCE and max(self.growth, 1.0 / self.growth) > WORTH_SAYING**2:
             word, times = ("grows", self.growth) if self.growth > 1.0 else ("falls", 1.0 / self.growth)
-            return f"the variance of {self.of} {word} {times:.3g} times over the recording"
+            return f"the variance of {self.of} {word} {plain(times)} times over the recording"
         return ""
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.core.units import format_quantity
+from microrad.core.units import format_limit, format_quantity
 from microrad.loop.disturbance import NO_REFERENCE, Disturbance, SampledReference, band_rms, psd
 from microrad.loop.disturbance.recorded import beyond_rms, density, edge_s, resampled
 from microrad.loop.disturbance.recorded_fit import RecordedFit
@@ -82,7 +82,8 @@ def refuse_short(fit: RecordedFit, settle_s: float) -> None:
         raise ValueError(
             f'"{fit.motion.name}" lasts {format_quantity(fit.motion.duration_s, "s", 3)}; the loop settles in '
             f"{format_quantity(settle_s, 's', 3)}, and ten times the {format_quantity(fit.correlation_s, 's', 3)} in "
-            f"which the motion forgets itself are needed behind that: record {format_quantity(needed, 's', 3)} or more"
+            "which the motion forgets itself are needed behind that: record "
+            f"{format_limit(needed, 's', 3, least=True)} or more"
         )
 
 

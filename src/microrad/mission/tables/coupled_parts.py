@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input, format_limit
 from microrad.mission.fields import Problem, ProblemsError, Quantity, Several, Table, Whole
 from microrad.mission.tables.mirror import INDEFINITE, Frequency, KeyList, Name, Rate, Voltage, least_alpha_1_v
 
@@ -79,7 +79,7 @@ class ActuatorTable(Table):
 
     def problems(self) -> Iterator[Problem]:
         """A range that goes up, and the bias within it."""
-        low, high = format_quantity(self.drive_min_v, "V"), format_quantity(self.drive_max_v, "V")
+        low, high = format_input(self.drive_min_v, "V"), format_input(self.drive_max_v, "V")
         if not self.drive_min_v < self.drive_max_v:
             yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
         elif not self.drive_min_v <= self.bias_v <= self.drive_max_v:
@@ -126,7 +126,7 @@ class RecordingTable(Table):
         if not self.excited_from_hz < self.excited_to_hz:
             yield Problem("excited_to", "is not above excited_from", "a band that goes up")
         if self.excited_to_hz > self.rate_hz / 2.0:
-            half = format_quantity(self.rate_hz / 2.0, "Hz")
+            half = format_limit(self.rate_hz / 2.0, "Hz")
             yield Problem("excited_to", f"is above half the rate ({half})", f"at most {half}")
 
 
@@ -276,7 +276,7 @@ class HysteresisTable(Table):
             return
         least = least_alpha_1_v(self.beta_1_v, self.gamma_1_v or 0.0, self.eta_1_v or 0.0)
         if not self.alpha_1_v > least:
-            size = format_quantity(least, "1/V")
+            size = format_limit(least, "1/V", least=True)
             reason = f"is not above what beta, gamma and eta take off it ({size}), so h would grow without bound"
             yield Problem("alpha", reason, f"above {size}")
         if self.d1 == self.epsilon == 0.0:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.core.units import format_quantity
+from microrad.core.units import format_limit
 from microrad.mission.fields import OrWord, Problem, Quantity, Share, Switch, Table
 from microrad.mission.tables.pointing import AngleOrZero, JitterTable
 
@@ -81,7 +81,7 @@ class Coupling(Table):
         """
         for key in ("defocus", "astigmatism", "coma", "spherical"):
             if abs(getattr(self, f"{key}_m") or 0.0) > wavelength_m / 2.0:
-                limit = format_quantity(wavelength_m / 2.0, "m")
+                limit = format_limit(wavelength_m / 2.0, "m")
                 reason = f"is above half the wavelength ({limit}): such light has no core to couple"
                 yield Problem(f"coupling.{key}", reason, f"at most {limit}")
 

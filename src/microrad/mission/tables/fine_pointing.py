@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.core.units import format_quantity
+from microrad.core.units import format_limit, format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table, Whole
 from microrad.mission.tables.mirror import ANGLE_MOST, Angle, DurationOrZero, Frequency, Name
 from microrad.mission.tables.pointing import TwoOffsets, two_axes_problems
@@ -294,7 +294,7 @@ class FinePointing(Table):
             given, better = format_quantity(self.duration_s, "s"), format_quantity(0.2 * self.duration_s, "s")
             yield Problem("settle", f"is not less than duration ({given})", f'settle = "{better}" would do')
         elif round(settling) >= round(samples):
-            better = format_quantity(self.settle_s + 2000.0 / self.rate_hz, "s")
+            better = format_limit(self.settle_s + 2000.0 / self.rate_hz, "s", least=True)
             reason = "leaves no control sample behind settle"
             yield Problem("duration", reason, f'a longer run: duration = "{better}" would do')
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from microrad.core import phase_error
 from microrad.core.capacity import Code, excess_noise_factor
-from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_limit, format_quantity
 from microrad.mission.codes import NamedCode, codes, nearest
 from microrad.mission.fields import OrWord, Problem, Quantity, Share, Table, Whole
 from microrad.mission.tables.coupling import Coupling
@@ -112,7 +112,7 @@ class Beam(Table):
         if self.strehl is not None and self.wavefront_error_m is not None:
             yield Problem("strehl", "stands beside wavefront_error", "one of the two removed")
         if self.wavefront_error_m is not None and self.wavefront_error_m > self.wavelength_m / 4:
-            limit = format_quantity(self.wavelength_m / 4, "m")
+            limit = format_limit(self.wavelength_m / 4, "m")
             reason = f"is above a quarter of the wavelength ({limit}): such a beam has no core to point"
             yield Problem("wavefront_error", reason, f"at most {limit}")
 

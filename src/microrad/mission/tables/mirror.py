@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input, format_limit
 from microrad.mission.fields import Problem, ProblemsError, Quantity, Several, Table
 
 ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
@@ -58,7 +58,7 @@ class LinearPart(Table):
         if not self.excited_from_hz < self.excited_to_hz:
             yield Problem("excited_to", "is not above excited_from", "a band that goes up")
         elif not self.excited_from_hz <= self.normalise_at_hz <= self.excited_to_hz:
-            low, high = format_quantity(self.excited_from_hz, "Hz"), format_quantity(self.excited_to_hz, "Hz")
+            low, high = format_input(self.excited_from_hz, "Hz"), format_input(self.excited_to_hz, "Hz")
             yield Problem(
                 "normalise_at", f"is outside excited_from to excited_to ({low} to {high})", f"{low} to {high}"
             )
@@ -185,7 +185,7 @@ class BoucWenTable(Table):
         """Hysteresis that stays bounded."""
         least = least_alpha_1_v(self.beta_1_v, self.gamma_1_v, self.eta_1_v)
         if not self.alpha_1_v > least:
-            size = format_quantity(least, "1/V")
+            size = format_limit(least, "1/V", least=True)
             names = "beta" if self.gamma_1_v == self.eta_1_v == 0.0 else "what beta, gamma and eta take off it"
             yield Problem(
                 "alpha", f"is not above the size of {names} ({size}), so h would grow without bound", f"above {size}"
@@ -440,10 +440,10 @@ class Mirror(Table):
         """One model, a linear part where the composition has one, a bias within the drive range, known parameters."""
         yield from _one_model(self)
         if not self.drive_min_v < self.drive_max_v:
-            low = format_quantity(self.drive_min_v, "V")
+            low = format_input(self.drive_min_v, "V")
             yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
         elif not self.drive_min_v <= self.bias_v <= self.drive_max_v:
-            span = f"{format_quantity(self.drive_min_v, 'V')} to {format_quantity(self.drive_max_v, 'V')}"
+            span = f"{format_input(self.drive_min_v, 'V')} to {format_input(self.drive_max_v, 'V')}"
             yield Problem("bias", f"is outside drive_min to drive_max ({span})", span)
         if self.composition == "static" and self.linear is not None:
             advice = 'the table linear removed, or composition = "cascade"'

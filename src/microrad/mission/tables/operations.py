@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input
 from microrad.mission.fields import Monthly, Problem, Quantity, Several, Table, Whole
 from microrad.mission.tables.mirror import Name
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Seconds
@@ -103,7 +103,7 @@ class ContactTable(Table):
     def problems(self) -> Iterator[Problem]:
         """A loss that a window can show."""
         if self.hold_s >= self.window_s:
-            shown = format_quantity(self.window_s, "s")
+            shown = format_input(self.window_s, "s")
             yield Problem("hold", f"is not below window ({shown}): a window would never show a loss", f"below {shown}")
 
 
@@ -198,9 +198,9 @@ class Constellation(Table):
             yield Problem("phasing", f"is not below planes = {self.planes}", f"0 to {self.planes - 1}")
         if self.shortest_s <= self.overhead_s:
             reason = "is not above overhead: such a session would carry no data"
-            yield Problem("shortest", reason, f"more than {format_quantity(self.overhead_s, 's')}")
+            yield Problem("shortest", reason, f"more than {format_input(self.overhead_s, 's')}")
         if self.session_s < self.shortest_s:
-            yield Problem("session", "is below shortest", f"at least {format_quantity(self.shortest_s, 's')}")
+            yield Problem("session", "is below shortest", f"at least {format_input(self.shortest_s, 's')}")
         if not self.relays:
             yield Problem("relays", "holds no relay", "a table such as [constellation.relays.east]")
         for name in self.stations:

@@ -6,7 +6,7 @@ from typing import Any
 
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.definition.records import Variable
-from microrad.campaign.optimisation.candidates import INTERVAL_CONFIDENCE, Candidate, Kept
+from microrad.campaign.optimisation.candidates import INTERVAL_CONFIDENCE, Candidate, Kept, percent
 from microrad.campaign.optimisation.search import Optimum
 from microrad.report.quantities import quantity
 
@@ -35,13 +35,13 @@ def _headline(optimum: Optimum) -> str:
     verb = "largest" if problem.minimise.startswith("-") else "least"
     cost = f"{verb} {_cost_name(optimum)}: {_quantity(optimum.best.cost, problem.cost_unit)}"
     if problem.limits:
-        cost += f", with each limit kept by at least {_percent(problem.confidence)} of the searched rows"
+        cost += f", with each limit kept by at least {percent(problem.confidence)} of the searched rows"
     return cost if optimum.confirmed else f"NOT CONFIRMED: {cost}"
 
 
 def fresh_rows_sentence(optimum: Optimum) -> str:
     """What fresh rows say of a feasible optimum, in a sentence."""
-    fresh, wanted = optimum.fresh, _percent(optimum.problem.confidence)
+    fresh, wanted = optimum.fresh, percent(optimum.problem.confidence)
     if fresh is None:
         return "It has not been checked with fresh rows."
     if fresh.refused:
@@ -57,7 +57,7 @@ def fresh_rows_sentence(optimum: Optimum) -> str:
 
 
 def _share_of(kept: Kept) -> str:
-    return f"{_limit(kept)} in {_percent(kept.share.value)} ({_band(kept)})"
+    return f"{_limit(kept)} in {percent(kept.share.value)} ({_band(kept)})"
 
 
 # -------------------------------------------------------------------------------------------------------------- tables
@@ -90,7 +90,7 @@ def _cost_name(optimum: Optimum) -> str:
 
 
 def _limits(optimum: Optimum) -> list[tuple[str, ...]]:
-    level = f"{_percent(INTERVAL_CONFIDENCE)} interval"
+    level = f"{percent(INTERVAL_CONFIDENCE)} interval"
     head = ("limit", "rows", "value in the deciding row", "share that keeps it", level)
     sets = (("searched", optimum.best), ("fresh", optimum.fresh))
     return [head, *(_kept(kept, rows) for rows, each in sets if each is not None for kept in each.kept)]
@@ -98,14 +98,14 @@ def _limits(optimum: Optimum) -> list[tuple[str, ...]]:
 
 def _kept(kept: Kept, rows: str) -> tuple[str, ...]:
     value = "failed" if isnan(kept.value) else _quantity(kept.value, OUTPUTS[kept.limit.output].unit)
-    return _limit(kept), rows, value, _percent(kept.share.value), _band(kept)
+    return _limit(kept), rows, value, percent(kept.share.value), _band(kept)
 
 
 def _legend(optimum: Optimum) -> list[str]:
     share = optimum.problem.confidence
     return [
-        f"deciding row: no row is worse but the {_percent(1.0 - share)} that may miss the limit.",
-        f"{_percent(share)} (optimise.confidence) is the share of the rows that is to keep each limit.",
+        f"deciding row: no row is worse but the {percent(1.0 - share)} that may miss the limit.",
+        f"{percent(share)} (optimise.confidence) is the share of the rows that is to keep each limit.",
     ]
 
 
@@ -120,11 +120,7 @@ def _limit(kept: Kept) -> str:
 
 
 def _band(kept: Kept) -> str:
-    return f"{100 * kept.share.low:.4g} to {100 * kept.share.high:.4g} %"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.4g} %"
+    return f"{percent(kept.share.low).removesuffix(' %')} to {percent(kept.share.high)}"
 
 
 def _quantity(value: float, unit: str) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.core.arrays import Floats
-from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity, plain
 from microrad.loop.disturbance import Reference
 from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
@@ -85,7 +85,7 @@ class Sampler:
         if samples > MOST_SAMPLES:
             raise ValueError(
                 f"{self.settings.windows} windows of {format_quantity(self.settings.window_s, 's')} hold "
-                f"{samples:.3g} control samples of a contact run, which may have at most {MOST_SAMPLES:.3g}: give "
+                f"{plain(samples)} control samples of a contact run, which may have at most {MOST_SAMPLES}: give "
                 "fewer windows, or shorter ones"
             )
 

@@ -9,6 +9,7 @@ import numpy as np
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
+from microrad.core.units import plain
 from microrad.lab.identify.linear.fit import (
     LinearFit,
     OrderScore,
@@ -195,16 +196,16 @@ def _score(fit: Fitted) -> OrderScore:
 
 
 def _reason(chosen: OrderScore, scan: Sequence[OrderScore]) -> str:
-    per = ", ".join(f"{s.order}: {s.chi_square / s.freedom:.3g}" for s in scan)
+    per = ", ".join(f"{s.order}: {plain(s.chi_square / s.freedom)}" for s in scan)
     reason = (
-        f"order {chosen.order} has the least criterion, {chosen.criterion:.4g} (chi-square + parameters x ln "
+        f"order {chosen.order} has the least criterion, {plain(chosen.criterion, 4)} (chi-square + parameters x ln "
         f"values); squared distance over its variance, per degree of freedom, by order: {per} (1 is what a true model "
         "leaves; what no order explains counts as noise)"
     )
     others = [s for s in scan if s.order != chosen.order]
     if others:
         next_best = min(others, key=lambda s: s.criterion)
-        reason += f"; order {next_best.order} is worse by {next_best.criterion - chosen.criterion:.3g}"
+        reason += f"; order {next_best.order} is worse by {plain(next_best.criterion - chosen.criterion)}"
     return reason
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from microrad.core.arrays import Complexes, Floats
 from microrad.core.lti import StateSpace
 from microrad.core.progress import Progress
+from microrad.core.units import plain
 from microrad.lab.identify.linear.modal import Hold, ModalModel, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, polish
@@ -184,16 +185,16 @@ def choose(scan: Sequence[OrderScore]) -> tuple[int, str]:
         scan: The orders that were compared, rising.
     """
     best = min(scan, key=lambda score: score.criterion)
-    per = [f"{s.order}: {s.chi_square / max(s.freedom, 1):.3g}" for s in scan]
+    per = [f"{s.order}: {plain(s.chi_square / max(s.freedom, 1))}" for s in scan]
     reason = (
-        f"order {best.order} has the least criterion, {best.criterion:.4g} (chi-square + parameters x ln values); "
-        f"squared distance over its variance, per degree of freedom, by order: {', '.join(per)} "
+        f"order {best.order} has the least criterion, {plain(best.criterion, 4)} (chi-square + parameters x ln "
+        f"values); squared distance over its variance, per degree of freedom, by order: {', '.join(per)} "
         "(1 is what a true model leaves)"
     )
     smaller = [s for s in scan if s.order < best.order]
     larger = [s for s in scan if s.order > best.order]
     if smaller:
-        reason += f"; order {smaller[-1].order} is worse by {smaller[-1].criterion - best.criterion:.3g}"
+        reason += f"; order {smaller[-1].order} is worse by {plain(smaller[-1].criterion - best.criterion)}"
     if larger:
         reason += (
             f"; order {larger[0].order} gains {max(best.chi_square - larger[0].chi_square, 0.0):.1f} in chi-square for "
@@ -313,8 +314,8 @@ def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats
         if decay_s > _RINGS * longest_s and hz * longest_s > _CYCLES:
             tone = _mode_share(model, k, records, hold, residual_rms) > _TONE
             found.append(
-                f"pole at {hz:.4g} Hz rings for {decay_s:.3g} s, the recording lasts {longest_s:.3g} s and cannot show "
-                f"that: {_STEADY if tone else _SPARE}; do not design a controller for it."
+                f"pole at {hz:.4g} Hz rings for {plain(decay_s)} s, the recording lasts {plain(longest_s)} s and "
+                f"cannot show that: {_STEADY if tone else _SPARE}; do not design a controller for it."
             )
     return found
 

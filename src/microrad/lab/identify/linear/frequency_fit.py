@@ -18,6 +18,7 @@ from microrad.core.installing import advice
 from microrad.core.labelled import Dataset, Group, variables
 from microrad.core.lti import StateSpace
 from microrad.core.progress import Progress
+from microrad.core.units import plain
 from microrad.lab.identify.linear.elements import ElementEquations
 from microrad.lab.identify.linear.fit import OrderScore, choose, given_orders, range_warnings
 from microrad.lab.identify.linear.modal import Hold, ModalModel, order_modes
@@ -475,15 +476,15 @@ def _errors_from(given: bool, variance: float, per: float) -> str:
     if not given:
         return "the residual: no standard errors were given, so the noise is taken to be what the model leaves"
     if variance == 1.0:
-        return f"the standard errors given; chi-square per degree of freedom is {per:.3g}"
-    return f"the standard errors given, times {variance**0.5:.3g} for what the model leaves beyond them"
+        return f"the standard errors given; chi-square per degree of freedom is {plain(per)}"
+    return f"the standard errors given, times {plain(variance**0.5)} for what the model leaves beyond them"
 
 
 def _misfit(per: float) -> tuple[str, ...]:
     """What the model leaves beyond the standard errors given, in words."""
     return (
-        f"the model leaves {per**0.5:.3g} times the standard errors given: the order is too low, the response is not "
-        "that of a linear system, or the errors are too small; those of the model are larger by as much.",
+        f"the model leaves {plain(per**0.5)} times the standard errors given: the order is too low, the response is "
+        "not that of a linear system, or the errors are too small; those of the model are larger by as much.",
     )
 
 
@@ -496,7 +497,7 @@ def _uneven(response: Complexes, residual: Complexes) -> tuple[str, ...]:
     if above <= _UNEVEN * below or above <= _ROUNDING * float(np.abs(response).max()):
         return ()
     return (
-        f"the model leaves {above / max(below, 1e-300):.3g} times as much where the response is large: the noise is "
+        f"the model leaves {plain(above / max(below, 1e-300))} times as much where the response is large: the noise is "
         "not alike, and an order chosen from it is too high; give standard_error, such as 0.01 * abs(response).",
     )
 

@@ -14,6 +14,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
+from microrad.core.units import plain
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, time_constants
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
@@ -79,7 +80,7 @@ def supported_models(
     """
     names, refused = [], []
     longest = max(r.drive_v.size * r.step_s for r in records)
-    short = f"the longest recording lasts {longest:.3g} s, and creep shows over seconds; record a staircase of 10 s"
+    short = f"the longest recording lasts {plain(longest)} s, and creep shows over seconds; record a staircase of 10 s"
     for model in models:
         form = FORMS.get(model)
         if form is not None and form.creep and (longest < 1.0 or len(time_constants(records)) < 2):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import plain
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
@@ -76,8 +77,8 @@ class Evidence:
     def text(self) -> str:
         """How much is judged, of which recordings."""
         count = len(self.judged)
-        named = " and ".join(f"{name} ({seconds:.3g} s)" for name, seconds in self.judged) if count < 4 else ""
-        return f"{self.seconds:.3g} s of {count} recording{'s' * (count > 1)}{f', {named}' if named else ''}"
+        named = " and ".join(f"{name} ({plain(seconds)} s)" for name, seconds in self.judged) if count < 4 else ""
+        return f"{plain(self.seconds)} s of {count} recording{'s' * (count > 1)}{f', {named}' if named else ''}"
 
 
 def evidence(recordings: Sequence[Recording], predictions: Sequence[Prediction]) -> Evidence:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import plain
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, made_rising
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
@@ -37,8 +38,8 @@ def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
     return [
         f"Valid for drives from {round(low, digits) + 0.0:g} V to {round(high, digits) + 0.0:g} V; outside that range "
         "the model is an extrapolation.",
-        f"Not valid above {rate:.4g} V/s, the fastest rate of the recordings: a sine over the whole drive range "
-        f"reaches it at {freq_hz:.4g} Hz.",
+        f"Not valid above {plain(rate, 4)} V/s, the fastest rate of the recordings: a sine over the whole drive range "
+        f"reaches it at {plain(freq_hz, 4)} Hz.",
     ]
 
 
@@ -103,14 +104,14 @@ def rate_warnings(records: Sequence[SiRecord], fit: Fit) -> list[str]:
     slowest, fastest = loop_rates(records)
     if one_rate_only(records):
         warnings.append(
-            f"One loop rate only (peaks from {slowest:.4g} V/s to {fastest:.4g} V/s): how the hysteresis changes with "
-            "frequency is not known from these recordings, and delta and d2 only describe the shape of this loop; "
-            "record the same loop at two more frequencies."
+            f"One loop rate only (peaks from {plain(slowest, 4)} V/s to {plain(fastest, 4)} V/s): how the hysteresis "
+            "changes with frequency is not known from these recordings, and delta and d2 only describe the shape of "
+            "this loop; record the same loop at two more frequencies."
         )
     elif isinstance(fit, PrandtlIshlinskiiFit) or (isinstance(fit, JointFit) and not depends_on_rate(fit)):
         warnings.append(
-            f"The loops have peak rates from {slowest:.4g} V/s to {fastest:.4g} V/s, and the model does not depend "
-            "on rate: one average loop stands for all."
+            f"The loops have peak rates from {plain(slowest, 4)} V/s to {plain(fastest, 4)} V/s, and the model does "
+            "not depend on rate: one average loop stands for all."
         )
     if noisiness(records) > 0.2:
         warnings.append(
@@ -212,7 +213,7 @@ def drift(
             warnings.append(
                 f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.2g} urad "
                 f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "
-                f"{residual.size * recording.step_s:.3g} s: creep beyond what the model holds, or a warming sensor."
+                f"{plain(residual.size * recording.step_s)} s: creep beyond what the model holds, or a warming sensor."
             )
     return largest, warnings
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import plain
 from microrad.lab.recording.checks.channel import block_means
 from microrad.lab.recording.records import Finding
 
@@ -42,8 +43,8 @@ def excitation(
     findings = []
     for label, text, (low, high) in zip(labels, still, bands, strict=True):
         said = (
-            f"{label} is excited from {low:.4g} to {high:.4g} Hz (99.9 % of its power); nothing outside that "
-            "band can be learnt from this record"
+            f"{label} is excited from {plain(low, 4)} to {plain(high, 4)} Hz (99.9 % of its power); nothing outside "
+            "that band can be learnt from this record"
         )
         if text:
             remedy = "it rests, and other recordings have to tell what it does" if may_rest else text[1]
@@ -263,11 +264,11 @@ def _lead(
     if not certain or samples < _LEAD_SAMPLES or (not broad and lead > _NARROW_RAD):
         return []
     text = (
-        f"{label} leads {labels[column]} by {math.degrees(lead):.3g} ± {math.degrees(lead_error):.1g} degrees at "
-        f"{at_hz:.4g} Hz, {samples:.3g} samples"
+        f"{label} leads {labels[column]} by {plain(math.degrees(lead))} ± {plain(math.degrees(lead_error), 1)} degrees "
+        f"at {plain(at_hz, 4)} Hz, {plain(samples)} samples"
     )
     if falls:
-        text += f", and by {math.degrees(top):.3g} degrees higher in the band, as behind a high-pass"
+        text += f", and by {plain(math.degrees(top))} degrees higher in the band, as behind a high-pass"
         return [Finding("lead", label, None, text, False)]
     text += "; an output cannot come before its drive: swap input and output if they are the wrong way round, else "
     return [Finding("lead", label, None, text + "align the channels in time", True)]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.core.units import LEAST, MOST
+from microrad.core.units import LEAST, MOST, plain
 from microrad.lab.recording.formats.source import StatedRate
 from microrad.lab.recording.records import Finding, RecordingError
 
@@ -62,7 +62,7 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
         if abs(other.rate_hz - first.rate_hz) > _SAME_RATE * first.rate_hz:
             raise RecordingError(
                 f"{where}: two sample rates: {first.rate_hz:.7g} Hz ({first.words}) and {other.rate_hz:.7g} Hz "
-                f"({other.words}), {other.rate_hz / first.rate_hz:.4g} times as much; correct the wrong one"
+                f"({other.words}), {plain(other.rate_hz / first.rate_hz, 4)} times as much; correct the wrong one"
                 f"{' (leave the rate out to use that of the file)' if rate_hz is not None else ''}."
             )
     return first.rate_hz
@@ -169,7 +169,7 @@ def _steps(
         return []
     row = int(np.argmax(np.abs(deviation)))
     text = (
-        f"{label}: the steps scatter by {100 * jitter:.2g} % rms of {step_s:.6g} s, most at {place(row + 1)} "
+        f"{label}: the steps scatter by {plain(100 * jitter, 2)} % rms of {step_s:.6g} s, most at {place(row + 1)} "
         f"({steps[row]:.6g} s); record with a hardware clock, or resample to a constant step"
     )
     return [Finding("jitter", label, row + 1, text, jitter > _JITTER_REFUSED)]
