@@ -1377,7 +1377,7 @@ def test_the_mirror_file_has_the_model_that_is_asked_for_or_the_chosen_one(model
 
 @pytest.mark.parametrize(
     ("name", "listed", "title"),
-    [(None, None, "l" * 200), (None, "of the list", "of the list"), ("mine", "of the list", "mine"), ("", "list", "")],
+    [(None, None, "l" * 200), (None, "of the list", "of the list"), ("mine", "of the list", "mine")],
 )
 def test_a_mirror_is_called_as_is_said_or_as_its_list_or_its_files(refused, folder, monkeypatch, name, listed, title):
     def identified(given, units, said, target, how, as_json):
@@ -1524,6 +1524,26 @@ def test_each_option_for_files_is_refused_beside_a_list(option, value, flag):
     with pytest.raises(frame.Refusal) as refusal:
         recordings.given_recordings(recordings.Options((Path("l.toml"),), **{option: value}))
     words = f"l.toml is a list of recordings and {flag} is for files: write it into the list instead."
+    assert str(refusal.value) == words
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "flag"),
+    [
+        ("input", ("u",), "--input"),
+        ("output", ("y",), "--output"),
+        ("output_file", (Path("y.csv"),), "--output-file"),
+        ("axes", "samples", "--axes"),
+        ("rate", 5.0, "--rate"),
+        ("time", "t", "--time"),
+        ("period", 5, "--period"),
+        ("validate", (Path("v.csv"),), "--validate"),
+    ],
+)
+def test_each_option_for_files_is_refused_beside_a_folder(tmp_path, option, value, flag):
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.given_recordings(recordings.Options((tmp_path,), **{option: value}))
+    words = f"{tmp_path} is a folder, as of a bench, and {flag} is for files: leave it out, or name the files."
     assert str(refusal.value) == words
 
 
@@ -1741,7 +1761,7 @@ def test_a_mission_is_written_with_the_command_that_goes_on_with_it(call, folder
     again = call("init", "my mission.toml")
     assert again.err == (
         "microrad: my mission.toml exists and is left as it is; name another one (microrad init other.toml) or go on "
-        "with: microrad run 'my mission.toml'.\n"
+        "with `microrad run 'my mission.toml'`.\n"
     )
     assert again.code == 2
 
@@ -2139,3 +2159,29 @@ def test_what_is_no_rate_is_refused_in_the_words_of_a_frequency(text, begins):
     with pytest.raises(typer.BadParameter) as refusal:
         lab._rate(text)
     assert str(refusal.value).startswith(begins) and "a frequency with its unit" in str(refusal.value)
+
+
+@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("name", ["", " "])
+def test_a_mirror_without_a_name_is_refused_before_anything_is_fitted(refused, folder, monkeypatch, name, several):
+    channels = (2, 2) if several else (1, 1)
+    given = SimpleNamespace(
+        channels=channels, name=None, several_channels=several, every=(), positions_m=None, signs=None, lever_arm_m=None
+    )
+    monkeypatch.setattr(lab, "given_recordings", lambda options: given)
+    for fits in ("_identify_axis", "identify_channels"):
+        monkeypatch.setattr(lab, fits, lambda *given: pytest.fail("it is fitted"))
+    assert "the mirror has no name; give one with --name" in refused("identify", "a.csv", "--name", name)
+
+
+def test_a_name_that_begins_like_an_option_is_led_by_its_folder_in_the_next_command(call, refused, folder, monkeypatch):
+    assert call("init", "--", "-x.toml").out == "-x.toml written. Next: microrad run ./-x.toml\n"
+    assert "go on with `microrad run ./-x.toml`." in refused("init", "--", "-x.toml")
+    assert "go on with `microrad run .`." in refused("init", ".")
+    preset = call("init", "--preset", "tbird", "--", "-t.toml").out
+    assert "Next: microrad" in preset and preset.endswith(" ./-t.toml\n")
+    made = call("campaign", "init", "--", "-c.toml").out
+    assert made.endswith("Next: microrad campaign run ./-c.toml\n")
+    monkeypatch.setattr("microrad.lab.bench.load_plan", lambda plan: SimpleNamespace(name=plan))
+    monkeypatch.setattr("microrad.lab.bench.write_folder", lambda *given: [])
+    assert call("bench", "plan.toml", "--output=-b").out.endswith("Next: microrad identify ./-b\n")

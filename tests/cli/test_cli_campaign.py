@@ -609,3 +609,8 @@ def test_two_ways_to_work_are_refused_by_run_and_resume_before_anything(refused,
     monkeypatch.setattr("microrad.campaign.run.resume_campaign", lambda *given: pytest.fail("it ran"))
     words = "--threads, --workers and --scheduler exclude each other; give one of them."
     assert refused("campaign", *command, *both) == f"microrad: {words}\n"
+
+
+def test_one_sound_chunk_is_told_as_one(call, monkeypatch):
+    monkeypatch.setattr("microrad.campaign.ledger.verify", lambda path: mending.Verified(1, (), (), ()))
+    assert call("campaign", "verify", "rows.ledger").out == "1 chunk with a right checksum\n"

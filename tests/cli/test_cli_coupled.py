@@ -457,9 +457,14 @@ def test_places_of_three_sensors_agree_with_any_response_and_a_line_of_them_is_r
         (["one/loop.csv", "two/loop.csv"], "loop"),
         (["/a.csv", "/b.csv"], "a"),
         (["mirror-characterisation-bench"], "mirror-characterisation-bench"),
+        (["."], "bench"),
+        (["./sub/.."], "bench"),
+        ([".."], "here"),
     ],
 )
-def test_what_a_mirror_of_several_files_is_called(folder, files, name):
+def test_what_a_mirror_of_several_files_is_called(folder, monkeypatch, files, name):
+    (folder / "here" / "bench" / "sub").mkdir(parents=True)
+    monkeypatch.chdir(folder / "here" / "bench")
     assert recordings.common_name([Path(file) for file in files]) == name
 
 
@@ -520,13 +525,3 @@ def test_what_was_said_of_several_channels_is_handed_on_and_their_files_are_writ
     assert (folder / "m.toml").read_text("utf-8") == text
     said = "microrad: stopped; the best model so far was written\n" if stopped else ""
     assert capsys.readouterr().err == said
-
-
-@pytest.mark.parametrize("title", ["", " \t"])
-def test_a_mirror_of_several_channels_without_a_name_is_refused_before_it_is_fitted(monkeypatch, title):
-    monkeypatch.setattr(coupled, "identify_coupled", lambda *given, **more: pytest.fail("it ran"))
-    target = cli_coupled.Target(Path("m.toml"), Path("p.html"), title, False, lambda: None)
-    with pytest.raises(Refusal) as refusal:
-        cli_coupled.identify_channels(None, ("V", "m"), "said", target, False)
-    words = "the mirror has no name; give one with --name, it stands in the mirror file and in the report."
-    assert str(refusal.value) == words

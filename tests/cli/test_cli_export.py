@@ -319,6 +319,7 @@ def test_an_imported_mirror_is_called_as_its_file_or_as_is_said(call, folder, mo
     next_is = "microrad run leo-geo.toml --mirror 'model 3-mirror.toml'"
     assert (result.code, result.out) == (0, f"model 3-mirror.toml written. Next: {next_is}\n")
     ((said, variable),) = taken
+    assert call("import", "sub/model 3.mat", *IMPORT, "--output=-m.toml").out.endswith(" --mirror ./-m.toml\n")
     assert (said.name, variable, said.output_unit) == (name, None, "rad")
     numbers = said.travel_rad, said.rate_limit_v_s, said.bias_v, said.drive_min_v, said.drive_max_v
     assert numbers == pytest.approx((2.5e-3, 3770.0, 6.0, 0.0, 12.0), rel=1e-12)

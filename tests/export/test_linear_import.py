@@ -774,6 +774,7 @@ def test_a_system_that_is_not_there_is_refused_with_those_that_are(tmp_path):
         message(tmp_path, {"s": roots(), "t": roots()}, variable="u"),
         message(tmp_path, {"s": 1.0, "t": "text"}, variable="s"),
         message(tmp_path, {"s": roots()}, variable=""),
+        message(tmp_path, roots(), variable="none"),
     ] == [
         "(folder)/model.mat has no system 'u'; it has 's', 't'; choose one of these",
         (
@@ -781,6 +782,10 @@ def test_a_system_that_is_not_there_is_refused_with_those_that_are(tmp_path):
             "or num den: save one of these forms"
         ),
         "(folder)/model.mat has no system ''; it has 's'; choose one of these",
+        (
+            "(folder)/model.mat has no system 'none'; it has one system, whose matrices are variables of their own: "
+            "give no name of a variable"
+        ),
     ]
 
 

@@ -473,6 +473,8 @@ def test_a_terminal_has_the_error_what_it_rests_on_poles_warnings_and_what_to_do
         "r.html written: what was found, with pictures.\na b.toml written (linear).\n"
         "Next: microrad run leo-geo.toml --mirror 'a b.toml' --output 'a b-study'"
     )
+    dashed = report.identification_text(full, "linear", mirror_file=Path("-m.toml"))
+    assert dashed.endswith("Next: microrad run leo-geo.toml --mirror ./-m.toml --output -m-study")
     assert "as asked" not in report.identification_text(full, full.chosen)
     lines = text.splitlines()
     assert len(lines) <= 23

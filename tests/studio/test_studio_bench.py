@@ -55,8 +55,10 @@ def test_a_controller_is_kept_for_the_content_of_a_mirror_file_not_for_its_name(
     made = []
     monkeypatch.setattr(control_model, "_kept", {})
     monkeypatch.setattr(control_model, "_controller", lambda file, name: made.append(file.mirror_file.sha256) or name)
+    monkeypatch.setattr(control_model, "with_contents", lambda file: file)
     before, anew = (
-        SimpleNamespace(sha256="m", mirror_file=SimpleNamespace(sha256=each, path=Path("mirror.toml"))) for each in "ab"
+        SimpleNamespace(sha256="m", mirror_file=SimpleNamespace(sha256=each, path=Path("mirror.toml")), contents=())
+        for each in "ab"
     )
     for file in (before, anew, before):
         assert control_model.controller(file, "PI") == "PI"
@@ -228,7 +230,7 @@ def test_a_rate_is_taken_from_the_file_where_it_states_one_alone():
     assert mirror_form.first_setting(listed(rates=(200.0,)), "a").rate == "200 Hz"
     assert mirror_form.first_setting(listed(rates=(200.0, 100.0)), "a").rate == ""
     assert mirror_form.rate_hz("") is None
-    assert mirror_form.rate_hz(" 200 ") == mirror_form.rate_hz("0.2 kHz") == 200.0
+    assert mirror_form.rate_hz(" 200 ") == mirror_form.rate_hz("0.2 kHz") == mirror_form.rate_hz("2e2") == 200.0
     with pytest.raises(SettingError, match=r"^sample rate: .*5 V"):
         mirror_form.rate_hz("5 V")
 
@@ -438,6 +440,8 @@ def test_a_recording_is_drawn_with_its_units():
     assert over_time["data"][1]["x"] == [0.0, 1.5, 2.99]
     assert mirror_view.about(viewed()) == "300 samples at 100 Hz, 3 s."
     assert mirror_view.findings(viewed()) == ["The output drifts."]
+    assert mirror_view.findings(replace(viewed(), findings=("µ is flat", "a.", ""))) == ["µ is flat.", "A.", "."]
+    assert mirror_view.about(replace(viewed(), samples=1)) == "1 sample at 100 Hz, 10 ms."
     assert not loop["config"]["displaylogo"]
 
 
@@ -476,7 +480,7 @@ def test_the_outcome_is_read_from_what_the_command_prints():
     found = mirror_view.outcome(json.dumps(said))
     model, (verdict, warned, refused) = found
     assert (model, verdict, warned.lines, refused.lines) == ("m", "a", ["Warning: b"], ["Not fitted: c: why"])
-    for damaged in ("", "{", "[]", '{"model": "m"}', '{"model": "m", "verdict": 1}'):
+    for damaged in ("", "{", "[]", 100_000 * "[", '{"model": "m"}', '{"model": "m", "verdict": 1}'):
         assert mirror_view.outcome(damaged) is None
     assert mirror_view.outcome(json.dumps({**said, "refused": {}})) == ("m", ("a", warned))
 
@@ -840,7 +844,8 @@ def test_only_so_many_controllers_are_kept_the_last_ones(monkeypatch):
     monkeypatch.setattr(control_model, "_kept", {})
     monkeypatch.setattr(control_model, "_MOST_KEPT", 2)
     monkeypatch.setattr(control_model, "_controller", lambda file, name: asked.append(name) or name)
-    file = SimpleNamespace(sha256="m", mirror_file=None)
+    monkeypatch.setattr(control_model, "with_contents", lambda file: file)
+    file = SimpleNamespace(sha256="m", mirror_file=None, contents=())
     assert [control_model.controller(file, name) for name in "abacba"] == [*"abacba"]
     assert asked == [*"abca"]
 
@@ -1033,7 +1038,7 @@ def test_what_an_identification_warns_of_and_could_not_fit_is_told_line_by_line(
             "Cancelled; nothing was written. Best so far: two, 0.75 % rms",
         ),
         ("lost", None, False, False, "lost: why"),
-        ("running", None, True, False, "Begins."),
+        ("running", None, True, False, "Begins, stopping."),
         ("running", Progress(2, 9, "play operators"), False, False, "2 of 9 fits: fitting prandtl_ishlinskii."),
         ("running", Progress(4, 9, "linear part"), False, True, "4 of 9 fits: linear part. Best so far: two, 0.75 %"),
     ],
@@ -1325,3 +1330,16 @@ def test_the_loop_of_control_is_shown_with_its_own_limits_and_rate(mission):
     at = np.interp(found.margins.crossover_hz, found.freq_hz, found.loop_gain)
     assert at == pytest.approx(1.0, rel=1e-2)
     assert np.max(found.sensitivity) == pytest.approx(1.0 / found.margins.modulus, rel=1e-2)
+
+
+def test_a_controller_is_tuned_anew_once_a_file_that_the_mission_names_is_another(tmp_path, monkeypatch):
+    text = SHIPPED.read_text("utf-8").replace('spectrum = "olympus"', 'spectrum = "table"\nfile = "shake.csv"', 1)
+    (tmp_path / "m.toml").write_text(text, "utf-8")
+    read = []
+    monkeypatch.setattr(control_model, "_kept", {})
+    monkeypatch.setattr(control_model, "_controller", lambda file, name: read.append(file.contents[0].content) or name)
+    contents = (b"Hz, urad^2/Hz\n0.1, 100\n1000, 0.1\n", b"Hz, urad^2/Hz\n0.1, 100\n1000, 0.2\n")
+    for content in (contents[0], *contents):
+        (tmp_path / "shake.csv").write_bytes(content)
+        control_model.controller(load_mission(tmp_path / "m.toml"), "PI")
+    assert read == [*contents]

@@ -296,8 +296,8 @@ def test_the_bounds_of_a_slider_are_those_of_the_mission_in_its_unit(rule, unit,
 
 
 def test_a_slider_in_decibels_has_a_position_at_least():
-    narrow = ranged(Quantity("dB", least=0.0, most=0.0), "0 dB", "dB", 0.0)
-    assert (narrow.scale, narrow.steps) == ("linear", 1)
+    narrow = ranged(Quantity("dB", least=0.0, most=0.01), "0 dB", "dB", 0.0)
+    assert (narrow.scale, narrow.steps, narrow.position) == ("linear", 1, 0)
 
 
 @pytest.mark.parametrize(
@@ -1098,3 +1098,35 @@ def test_a_cancelled_question_is_dropped_while_its_progress_is_told():
     go.set()
     thread.join(HANG_S)
     assert (done, latest.state) == ([], type(state)())
+
+
+@pytest.mark.parametrize("typed", ["1e300 dB", "-1e300 dB", "1e18 dB", "1.7e308 dB"])
+def test_a_value_in_decibels_beside_which_ten_are_nothing_has_no_slider(draft, typed):
+    key = "requirement.margin"
+    made = slider_of(draft.set(key, typed), key)
+    held = slider_of(draft, key).holding(typed)
+    assert {(each.scale, each.position, each.typed) for each in (made, held)} == {("none", 0, typed)}
+    for number in (0.0, -10.0):  # at the only value that the mission takes, and ten below the least
+        assert ranged(Quantity("dB", least=0.0, most=0.0), f"{number:g} dB", "dB", number).position == 0
+
+
+@pytest.mark.parametrize(
+    ("error", "words", "told"),
+    [
+        (OSError(28, "No space left on device"), "[Errno 28] No space left on device", []),
+        (
+            ZeroDivisionError("division by zero"),
+            "it ended with ZeroDivisionError: division by zero",
+            ["division by zero"],
+        ),
+    ],
+)
+def test_a_question_whose_work_fails_in_another_way_ends_all_the_same(monkeypatch, error, words, told):
+    def fails(progress):
+        raise error
+
+    seen, latest = [], Latest()
+    monkeypatch.setattr(threading, "excepthook", lambda args: seen.append(str(args.exc_value)))
+    latest.ask("a", fails)
+    state = latest.wait(HANG_S)
+    assert (state.running, state.error, seen) == (False, words, told)

@@ -458,6 +458,7 @@ def test_a_running_job_that_is_asked_to_stop_is_cancelling(tmp_path):
     ("said", "code", "words"),
     [
         ("", 3, "it ended with exit code 3 and said nothing"),
+        ("", None, "it ended without an exit code and said nothing"),
         (" \n\n", 0, "it ended with exit code 0 and said nothing"),
         ("", -15, "its process was ended by signal 15; signal 9 is often that of a machine out of memory"),
         ("Traceback\nValueError: odd\n\n", -9, "ValueError: odd"),

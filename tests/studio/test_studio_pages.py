@@ -1610,3 +1610,69 @@ def test_a_page_follows_the_session_and_does_not_show_what_it_has_changed_itself
             mark()
         look()
     assert shown == [3, 5, 4]
+
+
+@pytest.fixture
+def naming(session):
+    """A session whose mission names a mirror file and a spectrum."""
+    begin, end = TEXT.index("[mirror]\n"), TEXT.index("[amplifier]\n")
+    own = TEXT[begin:end].removeprefix("[mirror]\n").replace("[mirror.", "[")
+    text = f'{TEXT[:begin]}[mirror]\nfile = "mirror.toml"\n\n{TEXT[end:]}'
+    text = text.replace('spectrum = "olympus"', 'spectrum = "table"\nfile = "shake.csv"', 1)
+    (session.folder / "mirror.toml").write_text(own, "utf-8")
+    (session.folder / "shake.csv").write_text("Hz, urad^2/Hz\n0.1, 100\n1000, 0.1\n", "utf-8")
+    session.change(session.draft.with_text(text))
+    return session
+
+
+def rewrite(path, old, new):
+    path.write_text(path.read_text("utf-8").replace(old, new, 1), "utf-8")
+
+
+def test_a_file_that_the_mission_names_and_another_program_changes_is_read_anew(naming):
+    key, revision = naming.key, naming.revision
+    assert (naming.mission().mirror_file.path.name, naming.disk, naming.key) == ("mirror.toml", "", key)
+    rewrite(naming.folder / "shake.csv", "0.1, 100", "0.1, 1000")
+    assert (naming.disk, naming.revision) == ("", revision + 1)  # so that every page follows
+    shaken = naming.key
+    rewrite(naming.folder / "mirror.toml", "name = ", "# another mirror\nname = ")
+    turned = naming.key
+    assert naming.mission().mirror_file.text == (naming.folder / "mirror.toml").read_text("utf-8")
+    held = (naming.folder / "mirror.toml").read_bytes()
+    (naming.folder / "mirror.toml").unlink()
+    lost = naming.key
+    assert naming.mission() is None and "mirror.toml" in naming.faults()
+    (naming.folder / "mirror.toml").write_bytes(held)
+    assert len({key, shaken, turned, lost, naming.key}) == 5 and naming.mission() is not None
+    revision = naming.revision
+    naming.set(LEO, "6 cm")
+    assert (naming.inputs, naming.revision) == (naming.inputs, revision + 1)
+    naming.change(naming.draft.with_text(naming.draft.text.replace("shake.csv", "\\u0000")))
+    assert None in naming.inputs
+
+
+def test_each_page_asks_anew_once_a_file_that_the_mission_names_is_another(naming, days, links, controls, monkeypatch):
+    now, seen = [100.0], []
+    monkeypatch.setattr(link, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    page = Board(naming, link_view.sliders, lambda file: seen.append(file.mirror_file.text) or file)
+
+    def look():
+        days.reload()
+        links._ask_study()
+        now[0] += 2.0 * link._REST_S
+        links._ask_study()
+        for each in (controls.reload, controls.reload, page._reload, page._reload):
+            asyncio.run(each())
+
+    look()
+    rewrite(naming.folder / "mirror.toml", "name = ", "# another mirror\nname = ")
+    look()
+    rewrite(naming.folder / "shake.csv", "0.1, 100", "0.1, 1000")
+    days._show_progress(State(days.asked[-1], result=(1,)))
+    assert days.state.text == "The day of the mission before this."
+    look()
+    days._show_progress(State(days.asked[-1], result=(1,)))
+    assert days.state.text == "The day of the mission as it stands."
+    assert days.asked == links.asked and len(set(days.asked)) == 3
+    assert (controls.made, len(seen), len(page.shows)) == (["PI"] * 3, 3, 3)
+    assert ["# another mirror" in text for text in seen] == [False, True, True]

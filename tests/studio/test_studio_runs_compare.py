@@ -221,7 +221,16 @@ def test_progress_in_words():
 
 @pytest.mark.parametrize(
     ("share", "words"),
-    [(0.0, "0 %"), (0.001, "0.1 %"), (0.0994, "9.9 %"), (0.1, "10 %"), (0.104, "10 %"), (1.0, "100 %")],
+    [
+        (0.0, "0 %"),
+        (0.001, "0.1 %"),
+        (0.0994, "9.9 %"),
+        (0.0996, "10 %"),
+        (0.1, "10 %"),
+        (0.104, "10 %"),
+        (0.9996, "99 %"),
+        (1.0, "100 %"),
+    ],
 )
 def test_a_small_share_has_a_decimal(share, words):
     assert runs_view._percent(share) == words
@@ -904,3 +913,25 @@ def test_the_report_of_another_kind_of_job_is_none_of_a_campaign(tmp_path):
     verify = replace(written, arguments=("campaign", "verify", "./-x.ledger"))
     assert runs_view.others((verify, done), done).report is None
     assert runs_view.others((replace(written, number=1), done), done).report is None
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+00:00"])
+def test_a_time_without_a_zone_is_one_of_utc(tmp_path, zone):
+    job = Job(1, tmp_path, "done", started=f"2026-01-02T03:04:05{zone}", ended="2026-01-02T05:04:35+02:00")
+    assert runs_view.time_words(job) == "started 2026-01-02 03:04:05 UTC, 30 s"
+    assert runs_view.time_words(replace(job, ended="")).startswith("started 2026-01-02 03:04:05 UTC, ")
+
+
+def test_a_time_of_another_zone_is_told_in_utc(tmp_path):
+    job = Job(1, tmp_path, "queued", queued="2026-01-02T03:04:05+02:00")
+    assert runs_view.time_words(job) == "put in the queue 2026-01-02 01:04:05 UTC"
+    assert runs_view.time_words(replace(job, queued="0001-01-01T00:00:00+02:00")) == "put in the queue "
+
+
+@pytest.mark.parametrize("number", ["1" + 400 * "0", 100_000 * "["])
+def test_a_folder_of_another_program_is_no_study(session, draft, number):
+    path = finished(session, draft, "mine")
+    text = path.read_text("utf-8").replace('"actual": 4.0', f'"actual": {number}')
+    (session.folder / "other").mkdir()
+    (session.folder / "other" / "manifest.json").write_text(text, "utf-8")
+    assert number in text and compare_view.finished_study(session, draft).folder == "mine"

@@ -247,7 +247,7 @@ def test_files_on_their_way_count(tmp_path):
         first = asyncio.create_task(uploads.save("slow.csv", slow()))
         await begun.wait()
         assert uploads.listed() == ()
-        with pytest.raises(UploadError, match="1 recordings are here already"):
+        with pytest.raises(UploadError, match="1 recording is here already; remove one first"):
             await uploads.save("second.csv", blocks(b"1"))
         gate.set()
         return await first

@@ -29,7 +29,7 @@ from microrad.cli.frame import (
     say,
     width,
 )
-from microrad.core.folder import write_whole
+from microrad.core.folder import path_argument, write_whole
 
 __all__ = ["app", "main"]
 
@@ -53,8 +53,8 @@ def init(
     if preset is not None:
         return _init_preset(file or Path(f"{preset}.toml"), preset)
     file = file or Path("leo-geo.toml")
-    run_it = f"microrad run {shlex.quote(str(file))}"
-    check_target(file, f"name another one (microrad init other.toml) or go on with: {run_it}")
+    run_it = f"microrad run {shlex.quote(path_argument(file))}"
+    check_target(file, f"name another one (microrad init other.toml) or go on with `{run_it}`")
     write_whole(file, resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8"))
     return Outcome(f"{file} written. Next: {run_it}")
 
@@ -67,7 +67,7 @@ def _init_preset(file: Path, name: str) -> Outcome:
     except ValueError as error:
         raise Refusal(str(error)) from error
     chosen = next(each for each in presets.presets() if each.name == name)
-    run_it = f"microrad {'run' if chosen.whole else 'budget'} {shlex.quote(str(file))}"
+    run_it = f"microrad {'run' if chosen.whole else 'budget'} {shlex.quote(path_argument(file))}"
     check_target(file, f"name another one: microrad init --preset {name} other.toml")
     write_whole(file, text)
     first = f"{file} written. " + (f"To be given first: {', '.join(chosen.unknown)}. " if chosen.unknown else "")

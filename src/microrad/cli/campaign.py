@@ -195,11 +195,12 @@ def verify(ledger: _Ledger, as_json: Json = False) -> Outcome:
     """
     from microrad.campaign import ledger as ledgers
     from microrad.campaign.ledger import argument
+    from microrad.report.quantities import counted
 
     found = ledgers.verify(ledger)
     if as_json:
         return Outcome(json_text({**asdict(found), "sound": found.sound}), int(not found.sound))
-    lines = [f"{found.checked} chunks with a right checksum"]
+    lines = [f"{counted(found.checked, 'chunk')} with a right checksum"]
     lines += [f"damaged: chunk {number} of cell {cell}" for cell, number in found.damaged]
     lines += [f"damaged: {fault}" for fault in found.faults]
     if not found.sound:

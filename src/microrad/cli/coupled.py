@@ -53,8 +53,6 @@ def identify_channels(given: Given, units: tuple[str, str], said: str, target: T
     from microrad.lab.identify import coupled
     from microrad.lab.identify.coupled.mirror_file import coupled_file_text
 
-    if not target.title.strip():
-        raise Refusal("the mirror has no name; give one with --name, it stands in the mirror file and in the report.")
     with progress_bar() as bar:
         found = coupled.identify_coupled(
             given.recordings,

@@ -23,7 +23,7 @@ from microrad.cli.frame import (
     option,
     progress_bar,
 )
-from microrad.core.folder import write_whole
+from microrad.core.folder import path_argument, write_whole
 
 if TYPE_CHECKING:
     from microrad.export.choice import Choice
@@ -308,7 +308,7 @@ def import_(  # noqa: PLR0913, PLR0917  what a linear model does not say has to 
     path = output or Path(f"{file.stem}-mirror.toml")
     check_target(path, _OTHER, overwrite=overwrite, begins=b"# Mirror imported")
     write_whole(path, import_mat(file, given, variable))
-    return Outcome(f"{path} written. Next: microrad run leo-geo.toml --mirror {shlex.quote(str(path))}")
+    return Outcome(f"{path} written. Next: microrad run leo-geo.toml --mirror {shlex.quote(path_argument(path))}")
 
 
 def _quantity(flag: str, text: str, unit: str) -> float:

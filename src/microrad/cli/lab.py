@@ -28,7 +28,7 @@ from microrad.cli.frame import (
     width,
 )
 from microrad.cli.recordings import Given, Options, common_name, given_recordings, unit_of
-from microrad.core.folder import write_whole
+from microrad.core.folder import path_argument, write_whole
 
 if TYPE_CHECKING:
     from microrad.lab.identify import Identification
@@ -188,6 +188,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
     drive, drive_by = unit_of(given, "input", input_unit, "V")
     output, output_by = unit_of(given, "output", output_unit, "mrad")
     said = f"drive in {drive} ({drive_by}), output in {output} ({output_by})"
+    if not title.strip():
+        raise Refusal("the mirror has no name; give one with --name, it stands in the mirror file and in the report.")
     written = Target(target, page, title, overwrite, check)
     if given.several_channels:
         one_axis = {
@@ -317,4 +319,5 @@ def bench(
     if as_json:
         return Outcome(json_text({"plan": found.name, "folder": str(folder), "files": [str(f) for f in files]}))
     listed = "\n".join(map(str, files))
-    return Outcome(f"{listed}\n\n{len(files)} files written. Next: {shlex.join(['microrad', 'identify', str(folder)])}")
+    next_one = shlex.join(["microrad", "identify", path_argument(folder)])
+    return Outcome(f"{listed}\n\n{len(files)} files written. Next: {next_one}")

@@ -12,6 +12,7 @@ from microrad.cli.frame import Refusal
 if TYPE_CHECKING:
     from microrad.lab.recording import Recording
 
+_WITH_BENCH = ("accept", "position", "lever_arm", "input_unit", "output_unit")
 _LEAST_NAME = 3  # characters; what several names have in common says nothing where it is shorter
 
 
@@ -154,9 +155,20 @@ def _reader(options: Options) -> Callable[[Path, Path | None], tuple["Recording"
     )
 
 
+def _refuse_others(options: Options, taken: tuple[str, ...], what: str) -> None:
+    """Refuse the options that go with files alone; `what` was given in place of them."""
+    for each in fields(options):
+        if each.name not in ("files", *taken) and getattr(options, each.name) not in (None, ()):
+            flag = f"--{each.name.replace('_', '-')}"
+            raise Refusal(f"{options.files[0]} is {what.format(flag=flag)}.")
+
+
 def _of_bench(options: Options) -> Given:
     from microrad.lab import bench
 
+    _refuse_others(
+        options, _WITH_BENCH, "a folder, as of a bench, and {flag} is for files: leave it out, or name the files"
+    )
     found = bench.read_folder(options.files[0], options.accept)
     recordings, validation = (tuple(r for r, of in found if of == use) for use in ("identification", "validation"))
     return _together(
@@ -168,10 +180,7 @@ def _of_list(options: Options) -> Given:
     from microrad.lab.recording.list_file import read_list
 
     path = options.files[0]
-    for each in fields(options):
-        if each.name != "files" and getattr(options, each.name) not in (None, ()):
-            flag = f"--{each.name.replace('_', '-')}"
-            raise Refusal(f"{path} is a list of recordings and {flag} is for files: write it into the list instead.")
+    _refuse_others(options, (), "a list of recordings and {flag} is for files: write it into the list instead")
     found = read_list(path)
     return Given(
         found.recordings,
@@ -221,7 +230,7 @@ def common_name(files: Sequence[Path]) -> str:
     Args:
         files: The files, at least one.
     """
-    stems = [file.stem for file in files]
+    stems = [(file.resolve() if file.name in ("", "..") else file).stem for file in files]
     if len(set(stems)) == 1:
         return stems[0]
     # Runs of letters, of digits and of other characters, so that no word or number is cut in two.

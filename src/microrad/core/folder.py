@@ -56,6 +56,11 @@ def read_bytes(path: Path, most: int) -> bytes:
     return b"".join(parts)
 
 
+def path_argument(path: Path) -> str:
+    """A path as an argument of a command: one that begins like an option is led by its folder."""
+    return f"./{path}" if str(path).startswith("-") else str(path)
+
+
 def check_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str = "results") -> None:
     """Refuse a folder of results that holds something which must not be replaced.
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from microrad.core.folder import path_argument
+
 _WIDTH = 80  # columns of a printed table that goes to a file, as the command line has them
 
 
@@ -245,11 +247,6 @@ def identify(  # noqa: PLR0913  all but the first four are named options
 
 
 # -------------------------------------------------------------------------------------------------------------- pieces
-def path_argument(path: Path) -> str:
-    """A path as an argument: one that begins like an option is led by its folder."""
-    return f"./{path}" if str(path).startswith("-") else str(path)
-
-
 def _option(name: str, value: object) -> tuple[str, ...]:
     """An option with its value, in one word where the value begins like an option; nothing without a value."""
     if value is None:

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from microrad.core.folder import write_whole
-from microrad.mission.file import LinkFile, MissionFile
+from microrad.mission.file import LinkFile, MissionFile, named_files
 from microrad.mission.toml import MissionError
 from microrad.studio.draft.draft import Draft, DraftError, OnDisk
 from microrad.studio.guard import plain_files
@@ -37,8 +37,8 @@ class Session:
 
     `folder` is the working folder: nothing outside of it is written or listed. `studio` is the studio's own folder in
     it, `jobs` what runs, `campaigns` what their ledgers say so far. `revision` grows with each change of `draft`, of
-    `other` or of the file on disk, so a page sees that it is behind; `opened` with each draft that replaces another
-    instead of changing it.
+    `other`, of the file or of what it names on disk, so a page sees that it is behind; `opened` with each draft that
+    replaces another instead of changing it.
     """
 
     def __init__(self, folder: Path, file: Path | None = None) -> None:
@@ -61,6 +61,7 @@ class Session:
         self.campaigns = LiveCampaigns()
         self._other = self._kept(_OTHER)
         self._disk: tuple[Draft, object, OnDisk] | None = None
+        self._inputs: tuple[str, tuple[Path, ...], tuple[object, ...]] = ("", (), ())
         self._mission: tuple[Draft, MissionFile | None, str] | None = None
 
     # ------------------------------------------------------------------------------------------------------- missions
@@ -175,8 +176,9 @@ class Session:
     # ------------------------------------------------------------------------------------------------ the file on disk
     @property
     def disk(self) -> OnDisk:
-        """What has become of the draft's file on disk, by another program; looks at it now."""
+        """What has become of the draft's file on disk, by another program; looks at it now, and at `inputs`."""
         with self._lock:
+            self._look_at_inputs()
             draft, kept = self._draft, self._disk
             sign = _sign(draft.path)
             if kept is None or kept[0] is not draft or kept[1] != sign:
@@ -184,6 +186,29 @@ class Session:
                 if kept is not None and kept[2] != self._disk[2]:
                     self.revision += 1
             return self._disk[2] if self._disk else ""
+
+    @property
+    def inputs(self) -> tuple[object, ...]:
+        """What tells the files that the draft names, as they are on disk now, from what they were before."""
+        with self._lock:
+            self._look_at_inputs()
+            return self._inputs[2]
+
+    @property
+    def key(self) -> str:
+        """What tells the draft's results from those of another text, or of other files that it names."""
+        return f"{self._draft.sha256}{self.inputs or ''}"
+
+    def _look_at_inputs(self) -> None:
+        """Read the draft anew where a file that it names was changed; one with faults names those that it named."""
+        draft, file, (text, paths, signs) = self._draft, self.link(), self._inputs
+        if file is not None or draft.text != text:
+            paths = () if file is None else _named(file)
+        now = tuple(_sign(path) for path in paths)
+        self._inputs = (draft.text, paths, now)
+        if draft.text == text and now != signs:
+            self._draft = draft.again()
+            self.revision += 1
 
     def disk_words(self) -> str:
         """Why the file must not be run as it is on disk, and what to do; "" where it is what was read or saved here."""
@@ -229,11 +254,18 @@ def _unlinked(draft: Draft) -> Draft:
     raise DraftError(f"{where}, which it was not when it was opened; remove the link, or save under another name")
 
 
+def _named(file: LinkFile) -> tuple[Path, ...]:
+    """The files that a mission names, its mirror's among them."""
+    inner = file.mirror_file if isinstance(file, MissionFile) else None
+    own = () if inner is None else (inner.path,)
+    return (*own, *(file.path.parent / name for name in named_files(file.mission)))
+
+
 def _sign(path: Path) -> object:
     """What differs when a file was changed, at the price of a look; None where there is none."""
     try:
         now = path.stat()
-    except OSError:
+    except (OSError, ValueError):  # the last for a name that holds a NUL
         return None
     return (now.st_mtime_ns, now.st_size, now.st_ino, now.st_mode)
 

@@ -16,6 +16,7 @@ from typing import Any
 from microrad.campaign.ledger import chunk_format
 from microrad.campaign.ledger.chunk_format import Head
 from microrad.campaign.records import CampaignError
+from microrad.core.folder import path_argument
 
 FORMAT = chunk_format.VERSION
 _APPLICATION = 0x6D726164  # "mrad": SQLite's application_id, so that another program's file is told from a ledger
@@ -98,7 +99,7 @@ def files(path: Path) -> tuple[Path, ...]:
 
 def argument(path: Path) -> str:
     """A path as it is typed into a command line, in quotes where it needs them."""
-    return shlex.quote(str(path))
+    return shlex.quote(path_argument(path))
 
 
 def refuse_existing(path: Path) -> None:

@@ -67,6 +67,8 @@ def select(path: Path, variable: str | None) -> tuple[str, dict[str, Any]]:
 
 
 def _what_it_has(systems: dict[str, Any], variables: dict[str, Any]) -> str:
+    if [*systems] == [""]:
+        return "it has one system, whose matrices are variables of their own: give no name of a variable"
     if systems:
         return f"it has {', '.join(repr(name) for name in systems)}; choose one of these"
     listed = ", ".join(list(variables)[:20]) or "nothing"

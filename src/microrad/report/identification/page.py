@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from markupsafe import Markup
 
-from microrad.core.folder import write_whole
+from microrad.core.folder import path_argument, write_whole
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
@@ -161,7 +161,7 @@ def identification_text(
     """
     files = [] if report_file is None else [f"{report_file} written: what was found, with pictures."]
     if mirror_file is not None:
-        run_it = ["microrad", "run", "leo-geo.toml", "--mirror", str(mirror_file)]
+        run_it = ["microrad", "run", "leo-geo.toml", "--mirror", path_argument(mirror_file)]
         run_it += ["--output", f"{mirror_file.stem}-study"]
         files += [f"{mirror_file} written ({written}).", f"Next: {shlex.join(run_it)}"]
     last = "\n".join(files)

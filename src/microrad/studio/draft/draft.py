@@ -167,6 +167,10 @@ class Draft:
             text = text.replace("\n", "\r\n")
         return self if text == self.text else _draft(text, self.path, self.disk_sha256)
 
+    def again(self) -> Draft:
+        """The draft with the files that it names read anew."""
+        return _draft(self.text, self.path, self.disk_sha256)
+
     def file(self) -> MissionFile:
         """The mission of the text. Raises `MissionError` with every fault, as `microrad run` says them."""
         return load_mission(self.path, text=self.text)

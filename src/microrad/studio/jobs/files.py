@@ -198,7 +198,7 @@ def _words(folder: Path, state: State, code: int | None) -> str:
         return "\n".join(said[max(first, 0) :]).removeprefix("microrad: ")
     if code is not None and code < 0:
         return f"its process was ended by signal {-code}; signal 9 is often that of a machine out of memory"
-    return f"it ended with exit code {code} and said nothing"
+    return f"it ended {'without an exit code' if code is None else f'with exit code {code}'} and said nothing"
 
 
 def read_progress(folder: Path) -> Progress | None:

@@ -49,6 +49,7 @@ class ControlPage:
         """Build the body, and have it follow the session."""
         self.session = session
         self.file: MissionFile | None = None
+        self.key = ""
         self.question, self.round, self.filling = 0, 0, False
         self.found: dict[str, Controller | str] = {}
         self.plots: dict[str, Any] = {}
@@ -108,12 +109,12 @@ class ControlPage:
     async def reload(self) -> None:
         """Take over the mission as it is now; while it has faults, the last one stays."""
         stay(self.table)
-        file = self.session.mission()
+        key, file = self.session.key, self.session.mission()
         self.words.text = self.session.faults()
-        if file is None or (self.file is not None and file.sha256 == self.file.sha256 and file == self.file):
+        if file is None or (self.file is not None and key == self.key and file == self.file):
             return
         names = await in_thread(self.table, _names, file.mission.fine_pointing)
-        self.file, self.round = file, self.round + 1
+        self.file, self.key, self.round = file, key, self.round + 1
         self.found = dict.fromkeys(names, "not looked at yet")
         self._table()
         self.filling = True

@@ -62,12 +62,12 @@ class DayPage:
 
     def reload(self) -> None:
         """Have the day of the draft computed, if it can be."""
-        draft, file = self.session.draft, self.session.link()
+        key, draft, file = self.session.key, self.session.draft, self.session.link()
         lacking = "" if file is None else day_view.missing(file)
         self.faults.text = draft.report if file is None else lacking
         self.faults.visible = file is None or bool(lacking)
         if file is not None and not lacking:
-            self.latest.ask(draft.sha256, partial(_computed, file))
+            self.latest.ask(key, partial(_computed, file))
 
     async def look(self) -> None:
         """Show how far it is, and the day once it is there."""
@@ -83,7 +83,7 @@ class DayPage:
 
     def _show_progress(self, state: State[_Computed]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""
-        now = state.key == self.session.draft.sha256
+        now = state.key == self.session.key
         known = "The day of the mission as it stands." if now else "The day of the mission before this."
         words = known if state.result else "Not computed."
         self.state.text = f"Computing, {state.what or 'links'}{step}" if state.running else state.error or words

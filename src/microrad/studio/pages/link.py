@@ -98,7 +98,7 @@ class LinkPage(SliderPage[LinkView]):
         """Have the study of the links made once a draft rests, and show it once it is there."""
         self._ask_study()
         state = self.study.state
-        now = state.key == self.session.draft.sha256 and state.result is not None
+        now = state.key == self.session.key and state.result is not None
         before = "" if now or self.shown == "" else "Of the mission before this:"
         computing = "Computing acquisition and what moves the margins ..." if state.running else ""
         self.state.text = computing or state.error or before
@@ -111,13 +111,13 @@ class LinkPage(SliderPage[LinkView]):
 
     def _ask_study(self) -> None:
         """It takes a second of a core: not for every step of a slider."""
-        draft, now = self.session.draft, time.monotonic()
-        if self.rested[0] != draft.text:
-            self.rested = (draft.text, now)
-        elif now - self.rested[1] > _REST_S and self.study.state.key != draft.sha256:
+        key, now = self.session.key, time.monotonic()
+        if self.rested[0] != key:
+            self.rested = (key, now)
+        elif now - self.rested[1] > _REST_S and self.study.state.key != key:
             file = self.session.link()
             if file is not None:
-                self.study.ask(draft.sha256, partial(_study, file))
+                self.study.ask(key, partial(_study, file))
 
 
 def _told(study: LinkStudy) -> tuple[Sequence[Block], Mapping[str, Plot | str]]:

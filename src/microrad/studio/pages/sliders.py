@@ -188,6 +188,7 @@ class SliderPage(Generic[T]):
         self.last: Attempt[T] | None = None
         self._wanted: Callable[[], Attempt[T]] | None = None
         self._busy = self._grey = False
+        self._inputs = session.inputs
         with ui.element("div").classes("beside"):
             with ui.element("div").classes("slider-column"):
                 self.board = SliderBoard(self._try, self._set, seldom)
@@ -230,6 +231,9 @@ class SliderPage(Generic[T]):
     async def _reload(self) -> None:
         """Show the draft as it is, but for a slider that moves."""
         stay(self._faults)
+        inputs = self.session.inputs
+        if inputs != self._inputs:
+            self.last, self._inputs = None, inputs
         draft, moved = self.session.draft, self.board.moved
         self.board.show(self.sliders(draft))
         if moved is not None:

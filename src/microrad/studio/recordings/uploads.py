@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from microrad.report.quantities import counted
 from microrad.studio.guard import plain_files
 from microrad.studio.guard.names import safe_name, shown
 
@@ -115,9 +116,8 @@ class Uploads:
         """A new folder for one file: files on their way count, so that none slips in beside another."""
         places = self._places()
         if len(places) >= self.limits.files:
-            raise UploadError(
-                f"the file {shown(name)} is not taken: {len(places)} recordings are here already; remove one first"
-            )
+            there = f"{counted(len(places), 'recording')} {'is' if len(places) == 1 else 'are'} here already"
+            raise UploadError(f"the file {shown(name)} is not taken: {there}; remove one first")
         place = plain_files.private(self.folder) / secrets.token_hex(8)  # the folder may have been removed meanwhile
         place.mkdir(mode=0o700)
         return place

@@ -206,7 +206,7 @@ def finished_study(session: Session, draft: Draft) -> Found | None:
     """
     found = []
     for path in sorted(session.folder.glob(f"*/{MANIFEST}"))[:_MOST_FOLDERS]:
-        with suppress(OSError, ValueError, KeyError, TypeError):
+        with suppress(OSError, ValueError, KeyError, TypeError, RecursionError, OverflowError):
             if path.stat().st_size > _MOST_BYTES:
                 continue
             data = json.loads(read_bytes(path, _MOST_BYTES))

@@ -6,6 +6,7 @@ stands in the mission, alone and with the inverse ahead of it. Times are in s, a
 
 from __future__ import annotations
 
+import hashlib
 import math
 import threading
 from collections.abc import Mapping
@@ -28,7 +29,7 @@ from microrad.loop.disturbance import Reference
 from microrad.loop.pointing_loop import ensemble, linear, traces
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
-from microrad.mission.file import MissionFile
+from microrad.mission.file import MissionFile, with_contents
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.report.fine_pointing.page import ONE_AXIS, design_cells, designs
 from microrad.report.fine_pointing.words import tuned_to
@@ -63,7 +64,7 @@ def blocks(found: Mapping[str, Controller | str]) -> tuple[Block, ...]:
 
 _UNKNOWN = ("",) * 8  # margins, and what a design is bound by
 _MOST_KEPT = 32
-_kept: dict[tuple[str, str, str], Controller] = {}
+_kept: dict[tuple[str, ...], Controller] = {}
 _tuning = threading.Lock()  # two pages that want the same controller tune it once
 
 
@@ -74,8 +75,10 @@ def controller(file: MissionFile, name: str) -> Controller:
         file: the mission.
         name: one of `names`.
     """
-    inner = file.mirror_file
-    key = file.sha256, "" if inner is None else inner.sha256, name
+    file = with_contents(file)
+    inner, named = file.mirror_file, (each.content for each in file.contents)
+    digests = ("" if content is None else hashlib.sha256(content).hexdigest() for content in named)
+    key = (file.sha256, "" if inner is None else inner.sha256, *digests, name)
     with _tuning:
         if key not in _kept:
             _kept[key] = _controller(file, name)

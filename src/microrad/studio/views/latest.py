@@ -53,8 +53,8 @@ class Latest(Generic[T]):
     def ask(self, key: str, work: Callable[[Progress], T]) -> None:
         """Begin the work of a question, unless the same is being or has been worked on; an older one is dropped.
 
-        `work` may raise ValueError, whose words become the error; it calls its progress often, so that it can be
-        dropped.
+        `work` may raise ValueError and OSError, whose words become the error; it calls its progress often, so that it
+        can be dropped. What else it raises is told as the error, too, and ends its thread.
 
         Args:
             key: what tells the question from others.
@@ -96,10 +96,15 @@ class Latest(Generic[T]):
         try:
             try:
                 result = work(progress)
-            except ValueError as error:
+            except (ValueError, OSError) as error:
                 note(replace(current, running=False, error=str(error)))
             except MemoryError:
                 note(replace(current, running=False, error="the memory does not suffice; make the mission smaller"))
+            except SupersededError:
+                raise
+            except Exception as error:
+                note(replace(current, running=False, error=f"it ended with {type(error).__name__}: {error}"))
+                raise
             else:
                 note(replace(current, running=False, result=result))
         except SupersededError:

@@ -15,6 +15,7 @@ from microrad.core.units import format_quantity
 from microrad.lab.live_fit import LIVE_FITS, LiveFit
 from microrad.report.plotting.palette import BLACK, BLUE, GREY, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Line, Span, grid
+from microrad.report.quantities import counted
 from microrad.report.view import Block, Points, told
 from microrad.studio.guard import plain_files
 from microrad.studio.jobs.queue import Job
@@ -148,7 +149,7 @@ def outcome(said: str) -> tuple[str, tuple[Block, ...]] | None:
         warnings = [f"Warning: {each}" for each in map(str, data["warnings"])]
         refused = [f"Not fitted: {model}: {why}" for model, why in data["refused"].items()]
         return str(data["model"]), told(*map(str, data["verdict"]), Points(warnings), Points(refused))
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 
@@ -161,12 +162,13 @@ def doing(what: str) -> str:
 def about(view: View) -> str:
     """The recording in a sentence."""
     rate = format_quantity(view.rate_hz, "Hz")
-    return f"{view.samples} samples at {rate}, {format_quantity(view.samples / view.rate_hz, 's')}."
+    return f"{counted(view.samples, 'sample')} at {rate}, {format_quantity(view.samples / view.rate_hz, 's')}."
 
 
 def findings(view: View) -> list[str]:
     """What the checks of a recording have found, a sentence each."""
-    return [f"{each[:1].upper()}{each[1:].rstrip('.')}." for each in view.findings]
+    begun = (each[:1].upper() if each[:1].isascii() else each[:1] for each in view.findings)  # a unit is no word
+    return [f"{first}{each[1:].rstrip('.')}." for first, each in zip(begun, view.findings, strict=True)]
 
 
 def state_words(job: Job, first: LiveFit | None) -> str:
@@ -185,7 +187,8 @@ def state_words(job: Job, first: LiveFit | None) -> str:
     words = told.get(job.state, f"{job.state}: {job.words}")
     if job.state == "running" and job.progress is not None:
         words = f"{job.progress.done} of {job.progress.total} fits: {doing(job.progress.what)}."
-        words = f"{words[:-1]}, stopping." if job.cancelling else words
+    if job.state == "running" and job.cancelling:
+        words = f"{words[:-1]}, stopping."
     if first is None:
         return words
     lead = "Chosen" if job.state == "done" else "Best so far"

@@ -264,8 +264,11 @@ def rate_hz(typed: str) -> float | None:
     if not typed.strip():
         return None
     text = typed.strip()
+    with suppress(ValueError):
+        float(text)
+        text = f"{text} Hz"
     try:
-        return parse_quantity(text if re.search(r"[A-Za-z]", text) else f"{text} Hz", "Hz")
+        return parse_quantity(text, "Hz")
     except UnitError as error:
         raise SettingError(f"sample rate: {error}") from None
 

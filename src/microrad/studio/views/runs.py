@@ -11,11 +11,11 @@ from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
-from microrad.core.folder import read_bytes, write_whole
+from microrad.core.folder import path_argument, read_bytes, write_whole
 from microrad.core.units import format_quantity
 from microrad.mission.toml import MAX_BYTES, scan
 from microrad.report.quantities import duration
-from microrad.studio.commands import Action, campaign_report, path_argument
+from microrad.studio.commands import Action, campaign_report
 from microrad.studio.jobs.queue import Job, JobError, Kind, Order, Progress
 from microrad.studio.session import Session
 
@@ -126,7 +126,10 @@ def progress_words(progress: Progress | None) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.1 else f"{100.0 * share:.0f} %"
+    """A share in per cent; all of it alone is 100 %."""
+    if 0.0 < share < 0.0995:
+        return f"{100.0 * share:.1f} %"
+    return f"{100.0 * share if share >= 1.0 else min(100.0 * share, 99.0):.0f} %"
 
 
 def _what(progress: Progress) -> str:
@@ -154,8 +157,10 @@ def _at(time: str) -> str:
 
 
 def _read(time: str) -> datetime | None:
-    with suppress(ValueError):
-        return datetime.fromisoformat(time)
+    """A noted time in UTC, which one without a zone is taken for; None for what is none."""
+    with suppress(ValueError, OverflowError):
+        read = datetime.fromisoformat(time)
+        return read.replace(tzinfo=UTC) if read.tzinfo is None else read.astimezone(UTC)
     return None
 
 

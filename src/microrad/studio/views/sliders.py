@@ -83,7 +83,8 @@ class Slider:
         if found is None:
             return replace(self, typed=typed, scale="none")
         number, unit = found
-        if unit != self.unit or self.scale == "none" or (number <= 0.0 and self.scale == "logarithmic"):
+        huge = unit.startswith("dB") and number + REACH_DB == number
+        if unit != self.unit or self.scale == "none" or (number <= 0.0 and self.scale == "logarithmic") or huge:
             return _ranged(replace(self, typed=typed, value=number, unit=unit, scale="none"))
         return replace(self, typed=typed, value=number, low=min(self.low, number), high=max(self.high, number))
 
@@ -156,7 +157,8 @@ def _ranged(made: Slider) -> Slider:
     """A slider about its value: linear in decibels and for a plain number of zero between bounds, else by factors."""
     number, (least, most) = made.value, _bounds(made.rule, made.unit)
     if made.unit.startswith("dB"):
-        return replace(made, scale="linear", low=max(number - REACH_DB, least), high=min(number + REACH_DB, most))
+        low, high = max(number - REACH_DB, least), min(number + REACH_DB, most)
+        return replace(made, scale="linear", low=low, high=high) if low < high else made
     if number > 0.0 and FACTOR * number > most:
         return made  # near its end, a share is no matter of factors
     if number > 0.0:
