@@ -1075,6 +1075,7 @@ def plans(**changes):
     given = {"outputs": [SimpleNamespace(group="link")], "rows": 300, "block": 32, "chunk_rows": None}
     given |= {"realisations": 1, "loop_varies": False, "mission": None}
     of_table = {name: changes.pop(name) for name in list(changes) if name in table}
+    given["most_rows"] = getattr(of_table.get("precision"), "at_most", given["rows"])
     return planned(SimpleNamespace(**given | changes, table=SimpleNamespace(**table | of_table)))
 
 
@@ -1091,7 +1092,7 @@ def plans(**changes):
         ),
         ({"precision": SimpleNamespace(at_most=1100), "rows": 300}, Plan(256, 256, (512, 768, 1024), True)),
         ({"precision": SimpleNamespace(at_most=600), "rows": 300, "chunk_rows": 2}, Plan(2, 256, (512,), True)),
-        ({"precision": SimpleNamespace(at_most=511), "rows": 300}, Plan(256, 256, (300,), True)),
+        ({"precision": SimpleNamespace(at_most=511), "rows": 300}, Plan(256, 256, (511,), True)),
         ({"precision": SimpleNamespace(at_most=300), "rows": 300}, Plan(256, 256, (300,), True)),
     ],
 )

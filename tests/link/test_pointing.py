@@ -318,7 +318,7 @@ GAUSSIAN = {"temporal": [True, False, True, True, False, True], "mixed": [True, 
      0.000136558353, 6.20429217e-05, 0.000137956515, 0.000273116706],
      ["random, 2-sigma, radial: mean 0, standard deviation error / (2 sqrt(2)); random satellite at a random time "
       "(mixed)",
-      "drift, bound, about each axis: mean 0, standard deviation error / sqrt(3), evenly up to the bound / sqrt(3), "
+      "drift, bound, about each axis: mean 0, standard deviation error / sqrt(3) / sqrt(3), evenly up to the bound, "
       "ramp from zero; random satellite at a random time (mixed)",
       "bias, 1-sigma, about each axis: mean 0, standard deviation error / 1; random satellite at a random time (mixed)",
       "transient, 3-sigma, radial: mean 0, standard deviation error / (3 sqrt(2)), counted as always present; random "

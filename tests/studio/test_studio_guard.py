@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import textwrap
+from concurrent.futures import ThreadPoolExecutor
 from html import unescape
 from pathlib import Path
 
@@ -95,7 +96,8 @@ def exchange(app, scope, parts):
     async def send(message):
         sent.append(message)
 
-    asyncio.run(app(scope, receive, send))
+    with ThreadPoolExecutor(1) as thread:  # beside the loop that a browser leaves in this one
+        thread.submit(asyncio.run, app(scope, receive, send)).result()
     return Reply(sent, pulled)
 
 

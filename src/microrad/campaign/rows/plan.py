@@ -80,15 +80,15 @@ def _rounds(campaign: CampaignFile, largest_chunk: int) -> tuple[int, ...]:
 
     With a precision each round has whole chunks and blocks, so that what is done does not depend on where it stops;
     the last one ends at the most rows that are wanted, or less than a chunk or block before. Where these are less than
-    a chunk or block, there is one round of the rows that are asked for.
+    a chunk or block, there is one round, of all of them.
     """
     wanted = campaign.table.precision
     if wanted is None:
         return (campaign.rows,)
     unit = max(largest_chunk, campaign.block)  # powers of two, so the larger holds whole ones of the other
     totals, most = [-(-campaign.rows // unit) * unit], wanted.at_most // unit * unit
-    if totals[0] > wanted.at_most:
-        return (campaign.rows,)
+    if totals[0] > campaign.most_rows:
+        return (campaign.most_rows,)
     while totals[-1] < most:
         totals.append(min(-(-math.ceil(_GROWTH * totals[-1]) // unit) * unit, most))
     return tuple(totals)
