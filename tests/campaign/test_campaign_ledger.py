@@ -1149,3 +1149,12 @@ def test_damage_to_a_trace_and_a_note_of_the_second_cell_is_named_by_its_keys(pa
     with Ledger.open(path, write=False) as ledger:
         assert [(t.cell, t.row, t.output) for t in ledger.traces()] == [(0, 3, "margin")]
     assert verify(path).sound
+
+
+@pytest.mark.parametrize("change", [lambda c: {**c, "more": c["row"]}, lambda c: dict(reversed(c.items()))])
+def test_a_chunk_of_other_columns_or_in_another_order_is_of_another_microrad(path, change):
+    whole = chunk(3)
+    with Ledger.create(path, HEAD) as ledger:
+        told = said(ledger.put, 0, 3, chunk_format.pack_chunk(replace(whole, columns=change(whole.columns))))
+        assert ledger.count() == 0
+    assert told.endswith(f"and the ledger is of {', '.join(whole.columns)}: its worker runs another microrad")

@@ -955,3 +955,16 @@ def test_a_page_is_brought_up_to_date_once_for_each_revision(monkeypatch):
     session.revision = 8
     look()
     assert shows == [4, 5, 8]
+
+
+def test_bad_news_is_red_and_good_news_green(session, monkeypatch):
+    """Orange-red and bluish green, which also the colour-blind tell apart."""
+    given = []
+    monkeypatch.setattr(layout.ui, "colors", lambda **colours: given.append(colours))
+    client = Client(at("/"), request=None)
+    with client, layout.frame(session, "Mission", (("Mission", "/"),)):
+        pass
+    client.delete()
+    (colours,) = given
+    parts = {name: [int(colour[k : k + 2], 16) for k in (1, 3, 5)] for name, colour in colours.items()}
+    assert {name: part.index(max(part)) for name, part in parts.items()} == {"primary": 2, "negative": 0, "positive": 1}
