@@ -11,6 +11,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from bench_of_two_axes import LIMITS_AND_BENCH
 from microrad.lab import bench
 from microrad.lab.bench import load_plan, plan
 from microrad.lab.bench.plan import PlanError, packaged_plans
@@ -407,36 +408,10 @@ def test_a_plan_may_have_as_many_excitations_as_it_may_and_no_more(monkeypatch):
 
 
 # ---- a plan of two axes with numbers all unlike
-TWO_AXES = """
+TWO_AXES = f"""
 name = "two axes"
 formats = ["npz", "csv"]
-[limits]
-rate = "622.08 Hz"
-drive_min = "-3 V"
-drive_max = "9 V"
-slew = "700 V/s"
-samples_per_period = 4.5
-[bench]
-truth = "linear"
-axes = 2
-crosstalk = -0.25
-[bench.amplifier]
-gain = 12.5
-output_min = "-50 V"
-output_max = "125 V"
-bandwidth = "4 kHz"
-slew = "0.5 V/us"
-[bench.converters]
-bits = 14
-drive_min = "-3.5 V"
-drive_max = "9.5 V"
-output_min = "-2 mrad"
-output_max = "3 mrad"
-[bench.sensor]
-noise_share = 0.02
-mains = "3 urad"
-mains_frequency = "60 Hz"
-drift = "7 nrad/s"
+{LIMITS_AND_BENCH}drift = "7 nrad/s"
 [excitation.c]
 kind = "chirp"
 start = "0.7 Hz"

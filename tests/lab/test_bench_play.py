@@ -14,6 +14,7 @@ import pytest
 import scipy.io
 from nptdms import TdmsFile
 
+from bench_of_two_axes import LIMITS_AND_BENCH
 from microrad.core.folder import FolderError
 from microrad.lab.bench import folder as bench_folder
 from microrad.lab.bench import load_plan, play, select_records, write_folder
@@ -401,36 +402,10 @@ def test_a_format_without_its_library_says_what_to_install(short, tmp_path, monk
 
 
 # ---- two axes at a rate with digits
-TWO_AXES = """
+TWO_AXES = f"""
 name = "two axes"
 formats = ["csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5"]
-[limits]
-rate = "622.08 Hz"
-drive_min = "-3 V"
-drive_max = "9 V"
-slew = "700 V/s"
-samples_per_period = 4.5
-[bench]
-truth = "linear"
-axes = 2
-crosstalk = -0.25
-[bench.amplifier]
-gain = 12.5
-output_min = "-50 V"
-output_max = "125 V"
-bandwidth = "4 kHz"
-slew = "0.5 V/us"
-[bench.converters]
-bits = 14
-drive_min = "-3.5 V"
-drive_max = "9.5 V"
-output_min = "-2 mrad"
-output_max = "3 mrad"
-[bench.sensor]
-noise_share = 0.02
-mains = "3 urad"
-mains_frequency = "60 Hz"
-drift = "7 urad/s"
+{LIMITS_AND_BENCH}drift = "7 urad/s"
 [excitation.m]
 kind = "multisine"
 lines = "all"

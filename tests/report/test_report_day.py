@@ -980,6 +980,27 @@ def test_contacts_of_three_ways_stand_in_their_order_with_each_ones_own_numbers(
     ]
 
 
+WAY = [
+    "contacts",
+    "contact_s",
+    "longest_gap_s",
+    "could_carry_bit",
+    "contacts_without_acquisition",
+    "generated_bit",
+    "lost_bit",
+    "",
+    "on_board_at_end_bit",
+    "arrived_bit",
+    "latency_median_s",
+    "latency_99_percent_s",
+]
+
+
+def of_way(name):
+    """What the rows of a way are called in the JSON."""
+    return [each and f"day.{name}.{each}" for each in WAY]
+
+
 def test_three_ways_side_by_side_have_each_line_of_numbers_under_its_own_name():
     assert told_table(tables.ways_table(rich_day())) == [
         "Relay and downlinks",
@@ -1004,82 +1025,17 @@ def test_three_ways_side_by_side_have_each_line_of_numbers_under_its_own_name():
         ],
         [0],
         {
-            1: [
-                "day.relay.contacts",
-                "day.relay.contact_s",
-                "day.relay.longest_gap_s",
-                "day.relay.could_carry_bit",
-                "day.relay.contacts_without_acquisition",
-                "day.relay.generated_bit",
-                "day.relay.lost_bit",
-                "",
-                "day.relay.on_board_at_end_bit",
-                "day.relay.arrived_bit",
-                "day.relay.latency_median_s",
-                "day.relay.latency_99_percent_s",
-            ],
-            2: [
-                "day.direct.contacts",
-                "day.direct.contact_s",
-                "day.direct.longest_gap_s",
-                "day.direct.could_carry_bit",
-                "day.direct.contacts_without_acquisition",
-                "day.direct.generated_bit",
-                "day.direct.lost_bit",
-                "",
-                "day.direct.on_board_at_end_bit",
-                "day.direct.arrived_bit",
-                "day.direct.latency_median_s",
-                "day.direct.latency_99_percent_s",
-            ],
-            3: [
-                "day.optical.contacts",
-                "day.optical.contact_s",
-                "day.optical.longest_gap_s",
-                "day.optical.could_carry_bit",
-                "day.optical.contacts_without_acquisition",
-                "day.optical.generated_bit",
-                "day.optical.lost_bit",
-                "",
-                "day.optical.on_board_at_end_bit",
-                "day.optical.arrived_bit",
-                "day.optical.latency_median_s",
-                "day.optical.latency_99_percent_s",
-            ],
+            1: of_way("relay"),
+            2: of_way("direct"),
+            3: of_way("optical"),
         },
     ]
 
 
 def test_two_ways_of_which_one_is_optical_have_its_names():
     assert told_table(tables.ways_table(rich_day(direct=None)))[-1] == {
-        1: [
-            "day.relay.contacts",
-            "day.relay.contact_s",
-            "day.relay.longest_gap_s",
-            "day.relay.could_carry_bit",
-            "day.relay.contacts_without_acquisition",
-            "day.relay.generated_bit",
-            "day.relay.lost_bit",
-            "",
-            "day.relay.on_board_at_end_bit",
-            "day.relay.arrived_bit",
-            "day.relay.latency_median_s",
-            "day.relay.latency_99_percent_s",
-        ],
-        2: [
-            "day.optical.contacts",
-            "day.optical.contact_s",
-            "day.optical.longest_gap_s",
-            "day.optical.could_carry_bit",
-            "day.optical.contacts_without_acquisition",
-            "day.optical.generated_bit",
-            "day.optical.lost_bit",
-            "",
-            "day.optical.on_board_at_end_bit",
-            "day.optical.arrived_bit",
-            "day.optical.latency_median_s",
-            "day.optical.latency_99_percent_s",
-        ],
+        1: of_way("relay"),
+        2: of_way("optical"),
     }
 
 

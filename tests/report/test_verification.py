@@ -1500,6 +1500,23 @@ def test_the_parts_of_a_verification_show_each_check_status_and_domain():
     assert "Swept in this run." in page._domains(replace(v, full=True))[0]
 
 
+RECORDED = {
+    "one": {
+        "part": "the mirror",
+        "inputs": 1,
+        "outputs": 2,
+        "records": ["r1", "r2"],
+        "extents": {
+            "drive": {"least": 2.0, "most": 30.0, "unit": "V"},
+            "frequency": {"least": 3.0, "most": 31.0, "unit": "Hz"},
+            "rate": {"least": 4.0, "most": 32.0, "unit": "Hz"},
+            "position": {"least": 5.0, "most": 33.0, "unit": "m"},
+        },
+        "errors": [{"what": "axis x", "unit": "", "error": 0.0125, "allowed": 0.05}],
+    }
+}
+
+
 def test_the_data_of_a_verification_have_each_number_under_its_own_name():
     v = unlike()
     found = page.verification_data(v)
@@ -1671,21 +1688,7 @@ def test_the_data_of_a_verification_have_each_number_under_its_own_name():
                 "checks": ["c1", "c3"],
             }
         },
-        "recordings": {
-            "one": {
-                "part": "the mirror",
-                "inputs": 1,
-                "outputs": 2,
-                "records": ["r1", "r2"],
-                "extents": {
-                    "drive": {"least": 2.0, "most": 30.0, "unit": "V"},
-                    "frequency": {"least": 3.0, "most": 31.0, "unit": "Hz"},
-                    "rate": {"least": 4.0, "most": 32.0, "unit": "Hz"},
-                    "position": {"least": 5.0, "most": 33.0, "unit": "m"},
-                },
-                "errors": [{"what": "axis x", "unit": "", "error": 0.0125, "allowed": 0.05}],
-            }
-        },
+        "recordings": RECORDED,
         "recording_files": ["as of the release", "another one than at the release"],
         "files": {
             "against": "commit 7",
@@ -1727,21 +1730,7 @@ def test_the_data_of_a_verification_have_each_number_under_its_own_name():
             "Loops": {"failed": 1, "traced": 1, "verified": 1},
         },
         "bare": ["q4"],
-        "recordings": {
-            "one": {
-                "part": "the mirror",
-                "inputs": 1,
-                "outputs": 2,
-                "records": ["r1", "r2"],
-                "extents": {
-                    "drive": {"least": 2.0, "most": 30.0, "unit": "V"},
-                    "frequency": {"least": 3.0, "most": 31.0, "unit": "Hz"},
-                    "rate": {"least": 4.0, "most": 32.0, "unit": "Hz"},
-                    "position": {"least": 5.0, "most": 33.0, "unit": "m"},
-                },
-                "errors": [{"what": "axis x", "unit": "", "error": 0.0125, "allowed": 0.05}],
-            }
-        },
+        "recordings": RECORDED,
         "depends": {"Link margin": ["a.b"]},
     }
 

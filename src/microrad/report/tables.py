@@ -140,9 +140,10 @@ class Table:
     def parts(self, width: int) -> list["Table"]:
         """The table as tables that fit into so many columns of a terminal, each with the first column."""
         shown = self.for_width(width)
+        ranges = shown._ranges()
         kept, found = [0], []
-        for column in range(1, len(shown.headings)):
-            if len(kept) > 1 and shown.columns([*kept, column])._least() > width + 1:
+        for column in range(1, len(ranges)):
+            if len(kept) > 1 and sum(ranges[k][0] + 3 for k in (*kept, column)) > width + 1:
                 found.append(kept)
                 kept = [0]
             kept.append(column)
