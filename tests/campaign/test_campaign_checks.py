@@ -1344,3 +1344,21 @@ def test_the_second_mission_of_a_grid_is_checked_for_its_loop_in_full(mission):
         'loop.duration =  leaves 250 ms, all of it settling (375 ms): duration = "1.5 s" would do ()',
         'loop.duration =  leaves 62.5 ms, all of it settling (500 ms): duration = "2 s" would do ()',
     ]
+
+
+def test_links_alone_have_no_mirror_to_identify_and_two_cells_are_looked_at():
+    cells = tuple(Cell({}, {}, SimpleNamespace(mission=m)) for m in (load_mission(SHIPPED).mission, SimpleNamespace()))
+    told = []
+    for of in (cells, cells[1:]):
+        reader_of = lambda reader, of=of: draws.DrawReader(reader, DATA, of, frozenset())  # noqa: E731
+        told.append(noted(lambda reader, of=reader_of: of(reader).draw("mirror", {"distribution": "identified"})))
+    name, expected = (
+        cells[0].mirror.name,
+        '[set] with mirror = "FILE", or [grid] with mirror = ["FILE"]: a mirror file as microrad identify writes it, '
+        "seen from the campaign file ()",
+    )
+    assert told == [
+        f'inputs.mirror =  is to be identified, but the mirror "{name}" has no table uncertainty: {expected}',
+        f"inputs.mirror =  is to be identified, but the mission has no mirror, only its links: {expected}",
+    ]
+    assert draws.DrawReader(None, DATA, (), frozenset())._shares("", None, 4) == (0.25,) * 4

@@ -14,10 +14,13 @@ import pytest
 from scipy.stats import norm
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
+from made_tables import one_line
 from microrad import link
 from microrad.campaign import bundle
 from microrad.campaign import file as campaign_file
 from microrad.campaign.definition import cells, draws, keys
+from microrad.campaign.definition.distributions import OneOf, uncovered
+from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.definition.reader import block_rows
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
@@ -1420,3 +1423,306 @@ def test_what_is_rounded_up_is_told_with_both_numbers(tmp_path):
     assert [block_rows(runs) for runs in (1, 127, 128, 255, 256, 300, 32767, 32768, 10**6)] == [
         *(16, 16, 16, 16, 32, 32, 2048, 4096, 4096)
     ]
+
+
+# ----------------------------------------------------------------------------- each fault of a file with its whole line
+PRECISE = '[precision]\noutput = "{}"\nquantile = {}\nhalf_width = "{}"\nconfidence = {}\nat_most = {}\n'
+OPTIMISE = (
+    '[optimise]\nminimise = "{}"\nconfidence = {}\nrows = {}\nevaluations = {}\n'
+    '[optimise.variables."terminals.leo_aperture"]\nlow = "{}"\nhigh = "{}"\n'
+)
+RANGE = '[inputs."{}"]\ndistribution = "uniform"\nlow = "1 Hz"\nhigh = "2 Hz"\n'
+DRAWN_AS = '[inputs."communication.transmit_power".drawn_as]\ndistribution = "{}"\n{}\n'
+WHOLE_FAULTS = {
+    "a misspelt word, distribution and path": (
+        HEAD.replace("sobol", "latin") + POWER.replace("normal", "norml") + '[set]\nmirror = ""\n',
+        """
+        4 sampling = "latin" is none of the choices: sampling = "random" or sampling = "latin-hypercube" or sampling
+        = "sobol" (); 6 inputs.communication.transmit_power.distribution = "norml" is none of the choices:
+        distribution = "normal" or distribution = "uniform" or distribution = "log-uniform" or distribution =
+        "table" or distribution = "identified" ("normal"); 10 set.mirror = "" is no path: a mirror file, seen from
+        the campaign file: "mirror.toml" ()
+        """,
+    ),
+    "values of two axes": (
+        HEAD + POWER + '[grid]\n"terminals.leo_aperture" = [5, "6 cm", "7 kg"]\n"fine_pointing.runs" = [8, 8.5]\n',
+        """
+        10 grid.terminals.leo_aperture = 5 is a number without a unit: a length with its unit; for example
+        leo_aperture = "5 cm" (); 10 grid.terminals.leo_aperture = "7 kg" is in "kg", another kind of quantity: a
+        length with its unit; for example leo_aperture = "5 cm" (); 11 grid.fine_pointing.runs = 8.5 is not a whole
+        number: a whole number without quotes, from 1 to 100000; for example runs = 2 ()
+        """,
+    ),
+    "numbers of a precision": (
+        HEAD + POWER + PRECISE.format("margin", 1.5, "0 dB", 0.9, 0),
+        """
+        11 precision.quantile = 1.5 is not above 0 and below 1: a number without quotes, above 0 and below 1; for
+        example quantile = 0.99 (); 14 precision.at_most = 0 is below 1: a whole number without quotes, from 1 to
+        4294967296; for example at_most = 2 ()
+        """,
+    ),
+    "a half width": (
+        HEAD + POWER + PRECISE.format("margin", 0.5, "0 dB", 0.9, 512),
+        """
+        12 precision.half_width = "0 dB" is not above 0 dB: a ratio in decibels with its unit, above 0 dB; for
+        example half_width = "0.05 dB" ()
+        """,
+    ),
+    "an optimisation": (
+        HEAD + POWER + OPTIMISE.format("margin", 0.9, 8, 0, "5 cm", "50 mm"),
+        """
+        12 optimise.rows = 8 is below 16: a whole number without quotes, from 16 to 1000000; for example rows = 16
+        (); 13 optimise.evaluations = 0 is below 1: a whole number without quotes, from 1 to 100000; for example
+        evaluations = 2 ()
+        """,
+    ),
+    "bounds of a variable": (
+        HEAD + POWER + OPTIMISE.format("margin", 0.9, 64, 50, "5 cm", "50 mm"),
+        """
+        16 optimise.variables.terminals.leo_aperture.high = "50 mm" is not above low ("5 cm"): a range that goes up
+        ()
+        """,
+    ),
+    "two variables' units": (
+        HEAD + POWER + OPTIMISE.format("-terminals.leo_apertur", 0.9, 64, 50, "5 kg", 4),
+        """
+        10 optimise.minimise = "-terminals.leo_apertur" is neither a variable of the optimisation nor an output: one
+        of terminals.leo_aperture, (all outputs) ("-terminals.leo_aperture"); 15
+        optimise.variables.terminals.leo_aperture.low = "5 kg" is in "kg", another kind of quantity: a length with
+        its unit; for example low = "5 cm" (); 16 optimise.variables.terminals.leo_aperture.high = "4" is a number
+        without a unit: a length with its unit; for example high = "4 cm" ()
+        """,
+    ),
+    "a list and its item": (
+        HEAD + RANGE.format("scenario.pid_frequencies") + RANGE.format("scenario.pid_frequencies.1"),
+        """
+        9 inputs.scenario.pid_frequencies.1 =  is an item of scenario.pid_frequencies, which stands in [inputs] as a
+        whole: the list, or its items, in one of the two tables ()
+        """,
+    ),
+    "limits of two kinds": (
+        HEAD
+        + IDENTIFIED
+        + "mean = 2\n"
+        + '[limits.margin]\nleast = "5 dB"\nmost = "4 dB"\n[limits.answer_margins]\nmost = 3\n',
+        """
+        7 inputs.mirror.mean = 2 is no key of [inputs.mirror]: one of distribution (); 10 limits.margin.most = "4
+        dB" is not above least: a range that goes up (); 11 limits.answer_margins = "answer_margins" is no output:
+        one of (all outputs) ("answer_margin")
+        """,
+    ),
+    "a key of a limit": (
+        HEAD + POWER + '[limits.margin]\nleest = "5 dB"\n',
+        """
+        10 limits.margin.leest = "5 dB" is no key of [limits.margin]: one of least, most (least)
+        """,
+    ),
+    "another mission": (
+        HEAD.replace("mission.toml", "no.toml") + POWER,
+        """
+        0  =  the mission file does not exist: an existing file; `microrad init` writes one to start from ()
+        """,
+    ),
+    "numbers of the head": (
+        HEAD.replace("= 1", "= 1.5").replace("256", "2.0")
+        + 'worst = 101\nrow_limit = "0 s"\nrealisations = 0\n'
+        + POWER,
+        """
+        2 seed = 1.5 is not a whole number: a whole number without quotes, from 0 to 18446744073709551615; for
+        example seed = 2 (); 3 runs = 2.0 is not a whole number: a whole number without quotes, from 1 to
+        4294967296; for example runs = 2 (); 5 worst = 101 is above 100: a whole number without quotes, from 0 to
+        100; for example worst = 2 (); 6 row_limit = "0 s" is not above 0 s: a time with its unit, above 0 s, at
+        most 1000000000 s; for example row_limit = "5 s" (); 7 realisations = 0 is below 1: a whole number without
+        quotes, from 1 to 1000000; for example realisations = 2 ()
+        """,
+    ),
+    "a loop and a tail": (
+        HEAD + LOOP.replace("1 s", "2e9 s") + NOISE + '[tail]\nerror = "20 urad"\nprobability = 2\n',
+        """
+        7 loop.duration = "2e9 s" is above 1000000000 s: a time with its unit, above 0 s, at most 1000000000 s; for
+        example duration = "5 s" (); 14 tail.probability = 2 is not above 0 and below 1: a number without quotes,
+        above 0 and below 1; for example probability = 0.5 ()
+        """,
+    ),
+    "a tail of a loop that varies": (
+        HEAD + "realisations = 3\n" + LOOP + NOISE + '[tail]\nerror = "20 urad"\nprobability = 1e-6\n',
+        """
+        5 realisations =  stands beside [tail], whose rows are single errors: one of the two removed (); 9
+        inputs.fine_pointing.optical_sensor.noise =  changes the loop, and a table [tail] needs the same loop in all
+        rows: the mission's own value, or a grid of values ()
+        """,
+    ),
+    "tables that are none": (
+        'set = 3\ngrid = "a"\ninputs = []\nlimits = false\n' + HEAD,
+        """
+        1 set = 3 is no table: [set] with a key on each line below it (); 2 grid = "a" is no table: [grid] with a
+        key on each line below it (); 3 inputs = [] is no table: [inputs] with a key on each line below it (); 4
+        limits = false is no table: [limits] with a key on each line below it ()
+        """,
+    ),
+    "a settling that is all": (
+        HEAD + LOOP + 'settle = "1 s"\n' + POWER,
+        """
+        7 loop.duration =  leaves 1 s, all of it settling (1 s): duration = "4 s" would do ()
+        """,
+    ),
+    "an output without a loop": (
+        HEAD + 'keep = ["margin", "residual_rms"]\n' + POWER,
+        """
+        5 keep = "residual_rms" needs the fine-pointing loop: a table [loop], or this output left out ()
+        """,
+    ),
+    "a radius without a loop": (
+        HEAD + POWER + PRECISE.format("radius", 0.5, "1 urad", 0.9, 512),
+        """
+        10 precision.output = "radius" needs the fine-pointing loop: a table [loop], or another output ()
+        """,
+    ),
+    "a distribution in place of itself": (
+        HEAD + POWER + DRAWN_AS.format("identified", ""),
+        """
+        9 inputs.communication.transmit_power.drawn_as =  is no distribution that an input can be drawn as: a normal
+        one, for example ()
+        """,
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WHOLE_FAULTS)
+def test_each_fault_of_a_file_is_told_with_its_line_and_what_would_do(tmp_path, what):
+    text, told = WHOLE_FAULTS[what]
+    found = "; ".join(
+        f"{f.line} {f.key} = {f.value} {f.reason}: {f.expected} ({f.nearest})" for f in faults(tmp_path, text)
+    )
+    assert one_line(found) == one_line(told.replace("(all outputs)", ", ".join(OUTPUTS)))
+
+
+@pytest.mark.parametrize(
+    ("text", "rows", "most", "block", "realisations", "varies", "width"),
+    [
+        (HEAD + POWER, 256, 256, 32, 1, False, math.nan),
+        (HEAD.replace("256", "17") + POWER, 32, 32, 16, 1, False, math.nan),
+        (HEAD.replace("256", "129").replace("sobol", "latin-hypercube") + POWER, 144, 144, 16, 1, False, math.nan),
+        (HEAD.replace("256", "129").replace("sobol", "random") + POWER, 129, 129, 16, 1, False, math.nan),
+        (HEAD + "realisations = 3\n" + LOOP + POWER, 256, 256, 32, 3, False, math.nan),
+        (HEAD + LOOP + NOISE, 256, 256, 32, 64, True, math.nan),
+        (HEAD + "realisations = 5\n" + LOOP + NOISE, 256, 256, 32, 5, True, math.nan),
+        (HEAD + POWER + PRECISE.format("margin", 0.01, "50 mdB", 0.9, 300), 256, 320, 32, 1, False, 0.05),
+        (HEAD + POWER + PRECISE.format("data_rate", 0.01, "0.5 Mbit/s", 0.9, 256), 256, 256, 32, 1, False, 5e5),
+        (HEAD + LOOP + POWER + PRECISE.format("radius", 0.99, "0.5 urad", 0.9, 999), 256, 1024, 32, 1, False, 5e-7),
+    ],
+)
+def test_rows_come_in_whole_blocks_and_runs_as_the_loop_wants(
+    tmp_path, text, rows, most, block, realisations, varies, width
+):
+    c = loaded(tmp_path, text.replace('"50 mdB"', '"0.05 dB"'))
+    assert (c.rows, c.most_rows, c.block, c.realisations, c.loop_varies) == (rows, most, block, realisations, varies)
+    assert c.half_width == pytest.approx(width, rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "is_log", "middle"),
+    [(1e-6, 1e-5, True, 1e-5 / math.sqrt(10.0)), (0.04, 0.4, True, 0.4 / math.sqrt(10.0)), (1e-6, 9e-6, False, 5e-6)],
+)
+def test_a_variable_below_1_is_searched_by_ratios_too(low, high, is_log, middle):
+    variable = Variable("a", "rad", low, high)
+    assert (variable.log, variable.at(0.5)) == (is_log, pytest.approx(middle, rel=1e-12))
+    assert type(variable.at(np.float64(0.25))) is float
+
+
+def test_the_largest_rate_is_solved_for_in_each_cell_before_any_row(tmp_path):
+    text = f'{HEAD}{POWER}[set]\n"communication.data_rate" = "largest"\n"requirement.margin" = "4 dB"\n'
+    found = loaded(tmp_path, text + '[grid]\n"terminals.leo_aperture" = ["5 cm", "6.25 cm"]\n').cells
+    rates = [cell.file.mission.communication.data_rate_bit_s for cell in found]
+    assert rates[0] > 1e6 and rates[0] != rates[1]
+    assert [cell.data["communication"]["data_rate"] for cell in found] == [f"{each!r} bit/s" for each in rates]
+    margins = [evaluate.outputs(cell.file, None, ("margin",))["margin"] for cell in found]
+    assert margins == pytest.approx([4.0, 4.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "drawn", "covered"),
+    [
+        (((1.0, 2.0), ("a", "b"), True), ((1.0, 2.0), ("1 m", "2 m"), False), False),
+        (((1.0, 2.0), ("1 m", "2 m"), False), ((1.0, 2.0), ("a", "b"), True), False),
+        (((1.0, 2.0), ("a", "b"), True), ((1.0, 2.0), ("b", "a"), True), False),
+        (((1.0, 2.0), ("a", "b"), True), ((1.0, 2.0), ("a", "b"), True), True),
+        (((1.0, 2.0), ("1 m", "2 m"), False), ((3.0, 2.0, 1.0), ("3 m", "2 m", "100 cm"), False), True),
+        (((1.0, 4.0), ("1 m", "4 m"), False), ((3.0, 2.0, 1.0), ("3 m", "2 m", "1 m"), False), False),
+    ],
+)
+def test_words_stand_for_words_in_their_places_alone(wanted, drawn, covered):
+    of = [
+        OneOf(values, (1.0 / len(values),) * len(values), written, words) for values, written, words in (wanted, drawn)
+    ]
+    assert uncovered(*of) == ("" if covered else "does not draw every value of the table")
+
+
+# ------------------------------------------------------------------------------------------------- the mission of a row
+def test_the_mission_of_a_row_says_of_each_drawn_value_where_it_is_from(tmp_path):
+    listed = distributed("conventions.pointing_loss", TABLE + 'values = ["gain", "gaussian"]')
+    c = loaded(
+        tmp_path, HEAD + POWER + listed + distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "62.5 mm"]')
+    )
+    builder = MissionBuilder(c)
+    assert builder.mission(0, {}) is c.cells[0].file
+    power, loss, aperture = (each.key for each in c.inputs)
+    row = builder.mission(0, {power: 4.875, loss: 2.0, aperture: 0.0625})
+    assert [(s.line, s.comment, s.value, s.file) for s in (row.sources[key] for key in (power, loss, aperture))] == [
+        (0, "campaign: drawn, 4.875 W", "4.875 W", "campaign file"),
+        (0, "campaign: drawn, gaussian", "gaussian", "campaign file"),
+        (0, "campaign: drawn, 62.5 mm", "62.5 mm", "campaign file"),
+    ]
+    m = row.mission
+    assert (m.communication.transmit_power_w, m.conventions.pointing_loss, m.terminals.leo_aperture_m) == (
+        *(4.875, "gaussian", 0.0625),
+    )
+    own = c.cells[0].file
+    assert m.beacon is own.mission.beacon and row.sources["beacon.divergence"] == own.sources["beacon.divergence"]
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"communication.transmit_power": -1.5}, 'communication.transmit_power = "-1.5 W" is not above 0 W'),
+        (
+            {"communication.transmit_power": 0.0, "terminals.leo_aperture": -0.25, "requirement.outage": 1.0},
+            'terminals.leo_aperture = "-0.25 m" is not above 0 m; communication.transmit_power = "0.0 W" is not above '
+            "0 W; requirement.outage = 1.0 is not above 0 and below 1",
+        ),
+    ],
+)
+def test_a_row_that_is_no_mission_says_each_key_with_its_value_up_to_three(tmp_path, values, told):
+    builder = MissionBuilder(loaded(tmp_path, HEAD + POWER))
+    with pytest.raises(CampaignError) as error:
+        builder.mission(0, values)
+    assert str(error.value) == f"the row is no mission: {told}"
+    many = {f"terminals.{side}_aperture": -1.0 for side in ("leo", "geo")}
+    many |= {f"communication.{key}": -1.0 for key in ("transmit_power", "wavelength", "distance")}
+    with pytest.raises(CampaignError) as error:
+        builder.mission(0, many)
+    assert str(error.value).count("is not above") == 3
+
+
+def test_the_loop_of_a_row_goes_by_the_values_of_its_grid_and_draws_that_it_looks_at(tmp_path):
+    grid = '[grid]\n"fine_pointing.strain_gauge.noise" = ["0.1 urad", "0.2 urad"]\n'
+    grid += '"communication.distance" = ["40000 km"]\n'
+    builder = MissionBuilder(loaded(tmp_path, HEAD + LOOP + NOISE + POWER + grid))
+    noise, power = "fine_pointing.optical_sensor.noise", "communication.transmit_power"
+    assert builder.loop_key(1, {power: 5.0, noise: 1e-6}) == (
+        ("fine_pointing.strain_gauge.noise", "0.2 urad"),
+        (noise, 1e-6),
+    )
+    assert builder.loop_key(0, {power: 5.0}) == (("fine_pointing.strain_gauge.noise", "0.1 urad"),)
+    assert builder.several_axes(0, {noise: 1e-6}) is None
+
+
+def test_a_drawn_list_of_an_identified_mirror_goes_by_a_factor_and_leaves_no_uncertainty(tmp_path):
+    c = loaded(tmp_path, HEAD + LOOP + IDENTIFIED + '[set]\nmirror = "mirror.toml"\n')
+    d1, alpha, pole = (each.key for each in c.inputs)
+    row = MissionBuilder(c).mission(0, {d1: 9e-5, alpha: math.nan, pole: 1.25e3})
+    m = row.mission.mirror
+    assert (m.bouc_wen.d1_rad_v, m.uncertainty, m.linear.poles_hz) == (9e-5, None, (1250.0,))
+    assert m.bouc_wen.alpha_1_v == c.cells[0].mirror.bouc_wen.alpha_1_v, "what is not drawn stays"
+    assert alpha not in row.sources or "drawn" not in row.sources[alpha].comment
+    assert c.cells[0].mirror.uncertainty is not None

@@ -3,6 +3,7 @@
 import contextlib
 import hashlib
 import json
+import math
 import os
 import platform
 import random
@@ -1158,3 +1159,111 @@ def test_a_chunk_of_other_columns_or_in_another_order_is_of_another_microrad(pat
         told = said(ledger.put, 0, 3, chunk_format.pack_chunk(replace(whole, columns=change(whole.columns))))
         assert ledger.count() == 0
     assert told.endswith(f"and the ledger is of {', '.join(whole.columns)}: its worker runs another microrad")
+
+
+class Broken:
+    """A connection of which some tables cannot be read."""
+
+    def __init__(self, connection, *tables):
+        self.connection, self.tables = connection, tables
+
+    def execute(self, wanted, *values):
+        if any(f"FROM {each}" in wanted or f"PRAGMA {each}" in wanted for each in self.tables):
+            raise sqlite3.DatabaseError("malformed page")
+        return self.connection.execute(wanted, *values)
+
+
+@pytest.mark.parametrize(
+    ("tables", "told"),
+    [
+        (("traces",), ["the table of traces cannot be read: malformed page"]),
+        (("notes",), ["the table of notes cannot be read: malformed page"]),
+        (("head_again",), ["copy 2 of the head: malformed page"]),
+        (("head ", "notes"), ["the table of notes cannot be read: malformed page"]),
+        ((), []),
+    ],
+)
+def test_each_small_table_that_cannot_be_read_is_named(path, tables, told):
+    with Ledger.create(path, HEAD, {"state": "running"}) as book:
+        book.put_trace(TRACE)
+    with closing(sqlite3.connect(path)) as connection:
+        assert mending._small_faults(Broken(connection, *tables)) == told
+
+
+@pytest.mark.parametrize(
+    ("tables", "told"), [(("integrity_check",), ["SQLite cannot check its file: malformed page"]), ((), [])]
+)
+def test_a_file_whose_structure_cannot_be_checked_is_told(path, tables, told):
+    with Ledger.create(path, HEAD):
+        pass
+    with closing(sqlite3.connect(path)) as connection:
+        assert mending._structure(Broken(connection, *tables)) == told
+
+
+def test_chunks_that_cannot_be_read_to_the_end_are_a_fault_of_the_file(path, monkeypatch):
+    filled(path, 3)
+    monkeypatch.setattr(file, "connected", lambda at, write: closing_of(Broken(sqlite3.connect(at), "chunks")))
+    found = verify(path, [(0, 1), (1, 0)])
+    assert (found.checked, found.damaged, found.missing) == (0, (), ((0, 1), (1, 0)))
+    assert found.faults == ("the table of chunks cannot be read: malformed page",) and not found.sound
+
+
+def closing_of(broken):
+    """It is closed with what it reads from."""
+    broken.close = broken.connection.close
+    return broken
+
+
+@pytest.mark.parametrize(("cell", "number"), [(1, 4), (0, 7), (2, 0)])
+def test_a_chunk_that_came_for_another_names_both(path, cell, number):
+    with Ledger.create(path, HEAD) as book, pytest.raises(CampaignError) as told:
+        book.put(cell, number, packed(4))
+    assert str(told.value) == f"chunk 4 of cell 0 came for chunk {number} of cell {cell}"
+
+
+def test_what_is_no_ledger_is_not_mended_and_stays(tmp_path):
+    other = tmp_path / "notes.txt"
+    other.write_bytes(b"no ledger at all, but my notes " * 40)
+    with pytest.raises(CampaignError, match="is no ledger, or its first page is damaged"):
+        mend(other)
+    assert other.read_bytes() == b"no ledger at all, but my notes " * 40
+    missing = tmp_path / "none.ledger"
+    with pytest.raises(CampaignError, match=rf"^there is no ledger {missing}: begin the campaign with"):
+        mend(missing)
+    assert not missing.exists() and not file.draft_of(missing).exists()
+
+
+@pytest.mark.parametrize(
+    ("values", "ends"),
+    [([1.0], (1, 0)), ([], (0, 0)), ([2.0, 2.0], (2, 0)), ([1.0, 2.0], (1, 1)),
+     ([1.0, 1.0, 3.0, 2.0, 2.0, 2.0], (2, 3)),
+     ([0.0, -0.0], (1, 1)), ([math.nan, math.nan, 1.0], (2, 1))],
+)  # fmt: skip
+def test_runs_at_both_ends_are_told_bit_by_bit(values, ends):
+    bits = np.array(values).view("<u8") if values else np.zeros(0, dtype="<u8")
+    assert chunk_format._ends(bits) == ends
+    held = chunk_format._held(len(values), *ends)
+    kept = len(values) - max(ends[0] - 1, 0) - max(ends[1] - 1, 0)
+    assert (held.start, held.stop - held.start) == (max(ends[0] - 1, 0), kept)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"code": ("aa", "bb")}, "another code, so"),
+        ({"code": ("aa", "bb"), "campaign": ("cc", "dd")}, "another campaign and code, so"),
+        ({"code": ("aa", None), "mission": (None, "ee")}, "another code and mission, so"),
+    ],
+)
+def test_what_a_ledger_was_begun_with_is_told_in_the_order_of_names(changes, words):
+    kept = {name: old for name, (old, _) in changes.items() if old} | {"same": "x"}
+    now = {name: new for name, (_, new) in changes.items() if new} | {"same": "x"}
+    with pytest.raises(CampaignError) as told:
+        check_same(kept, now, Path("b.ledger"))
+    lines = [f"  {name}: {changes[name][0]} in the ledger, {changes[name][1]} now" for name in sorted(changes)]
+    assert str(told.value).splitlines() == [
+        f"b.ledger was begun with {words} its rows would not belong together:",
+        *lines,
+        "bring back what it was begun with, or begin the campaign anew in another file",
+    ]
+    check_same(kept, dict(reversed(kept.items())), Path("b.ledger"))

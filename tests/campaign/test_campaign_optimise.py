@@ -1462,3 +1462,59 @@ def test_a_share_that_is_not_all_is_told_from_it(share, words):
 def test_a_band_of_shares_that_ends_below_all_says_so():
     kept = Kept(MARGIN, 3.1, 0.1, Interval(0.99997, 0.99991, 0.999995, 0.95))
     assert words._share_of(kept).endswith(" in 99.997 % (99.991 to 99.9995 %)")
+
+
+def test_the_tables_of_a_file_become_a_problem_whose_fresh_rows_come_behind_the_first(monkeypatch):
+    wanted = SimpleNamespace(minimise="-power", confidence=0.875, rows=24, evaluations=60)
+    campaign = SimpleNamespace(
+        table=SimpleNamespace(optimise=wanted, seed=41), variables=(POWER_W, ANGLE), limits=(BOTH, RESIDUAL)
+    )
+    made, asked = [], []
+
+    class Rows:
+        def __init__(self, *given):
+            made.append(given)
+
+        def columns(self, x, first=0):
+            return x, first
+
+    monkeypatch.setattr(optimisation_campaign, "load_campaign", lambda file: asked.append(file) or campaign)
+    monkeypatch.setattr(optimisation_campaign, "_CandidateRows", Rows)
+    monkeypatch.setattr(optimisation_campaign, "optimise", lambda *given: given)
+    asked_of, rows, fresh, told = optimisation_campaign.optimise_campaign("a.toml", 3, quiet)
+    assert (asked, made, told) == (["a.toml"], [(campaign, 24, 3)], quiet)
+    assert asked_of == Problem((POWER_W, ANGLE), "-power", (BOTH, RESIDUAL), 0.875, 60, 41)
+    assert (rows("x"), fresh("x")) == (("x", 0), ("x", 24))
+    optimisation_campaign.optimise_campaign("a.toml")
+    assert made[1] == (campaign, 24, None)
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "words"),
+    [
+        (3.0625, None, "margin >= 3.062 dB"),
+        (None, -2.5, "margin <= -2.5 dB"),
+        (0.0, 0.5, "margin >= 0 dB and <= 0.5 dB"),
+    ],
+)
+def test_each_side_of_a_limit_stands_with_its_sign_be_it_0_or_below(least, most, words):
+    assert Kept(Limit("margin", least, most, ""), 0.0, 0.0, Interval(1.0, 0.9, 1.0, 0.95)).wanted == words
+
+
+@pytest.mark.parametrize(
+    ("values", "weight", "probability", "at"),
+    [
+        ([3.0, 1.0, 2.0, 4.0], [1.0, 1.0, 1.0, 1.0], 0.0, 1),
+        ([3.0, 1.0, 2.0, 4.0], [1.0, 1.0, 1.0, 1.0], 0.25, 2),
+        ([3.0, 1.0, 2.0, 4.0], [1.0, 1.0, 1.0, 1.0], 0.25 - 2e-9, 1),
+        ([3.0, 1.0, 2.0, 4.0], [1.0, 1.0, 1.0, 1.0], 1.0, 3),
+        ([3.0, 1.0, 2.0, 4.0], [6.0, 1.0, 2.0, 1.0], 0.5, 0),
+        ([2.0, 1.0, 1.0, 1.0], [1.0, 3.0, 1.0, 2.0], 0.45, 2),
+    ],
+)
+def test_the_row_that_decides_is_the_first_beyond_the_share_and_of_equal_ones_the_first(
+    values, weight, probability, at
+):
+    from microrad.campaign.optimisation.candidates import _at
+
+    assert _at(np.array(values), np.array(weight), probability) == at

@@ -1,6 +1,7 @@
 """Campaigns from file to ledger: the same rows however they are run, killed, stopped, damaged or resumed."""
 
 import itertools
+import math
 import os
 import random
 import shutil
@@ -10,7 +11,8 @@ import subprocess
 import sys
 import tempfile
 import tracemalloc
-from dataclasses import replace
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -20,7 +22,7 @@ from scipy import stats
 
 import microrad
 from campaign_files import MIRROR, UNCERTAINTY
-from microrad.campaign import bundle, records, run
+from microrad.campaign import bundle, records, run, work
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.engines import cluster
 from microrad.campaign.export import export_rows
@@ -38,6 +40,7 @@ from microrad.campaign.statistics.cell import CellRows
 from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.core import folder, kernels
+from microrad.mission.file import load_mission
 from shipped import SHIPPED
 from small_campaign import (
     Here,
@@ -1478,3 +1481,321 @@ def test_a_chunk_of_a_loop_is_a_second_of_steps_and_whole_batches(monkeypatch, v
     assert planned(campaign) == Plan(8, 8, (rows,), False)
     outputs.pop()
     assert planned(campaign) == Plan(*[1 << rows.bit_length() - 1] * 2, (rows,), True)
+
+
+# ------------------------------------------------------------------------------------------------- what a worker does
+@pytest.mark.parametrize("looped", [False, True])
+def test_a_worker_does_chunks_rows_and_traces_by_the_numbers_of_their_job(monkeypatch, looped):
+    asked, table = [], SimpleNamespace(loop="a loop" if looped else None)
+    campaign = SimpleNamespace(table=table, mission="a mission")
+
+    class Rows:
+        def __init__(self, *given):
+            asked.append(given)
+
+        def rows(self, cell, rows, beat, attempts=2, number=0):
+            return cell, rows, beat, attempts, number
+
+        def trace(self, *given):
+            return given
+
+        def controller(self, cell):
+            return f"of cell {cell}"
+
+    loop = SimpleNamespace(timing=SimpleNamespace(period_s=0.25))
+    opened = SimpleNamespace(campaign=campaign, controllers=("first", "second"))
+    for name, fake in {
+        "opened": lambda spec: asked.append(spec) or opened,
+        "planned": lambda of: Plan(4, 4, (10,), of is not campaign),
+        "Evaluator": Rows,
+        "mission_loop": lambda *given: asked.append(given) or SimpleNamespace(row=loop),
+    }.items():
+        monkeypatch.setattr(work, name, fake)
+    monkeypatch.setattr(work.traces, "trace", lambda *given: asked.append(given))
+    monkeypatch.setattr(work.chunk_format, "pack_chunk", lambda of: ("chunk", *of))
+    monkeypatch.setattr(work.chunk_format, "pack_trace", lambda of: ("trace", *of))
+    made = work.Work(b"a spec")
+    first = [b"a spec", (campaign, {0: "first", 1: "second"})]
+    span = loops.Span(0.5, 0.0, 0)
+    assert asked == first + [("a mission", "a loop", 0), (loop, "of cell 0", span)] * looped
+    assert made.do(records.Job(3, 2), "beat") == ("chunk", 3, range(8, 10), "beat", 2, 2)
+    assert made.do(records.Job(3, 1, 7, "row"), "beat") == ("chunk", 3, range(7, 8), "beat", 1, 1)
+    assert made.do(records.Job(3, 1, 7, "trace"), "beat") == ("trace", 3, 7, "beat")
+
+
+@pytest.mark.parametrize(
+    ("means", "kind", "processes"),
+    [
+        ({}, "local", 5),
+        ({"threads": 3}, "local", 3),
+        ({"workers": 2}, "local", 2),
+        ({"scheduler": "tcp://there", "workers": 2}, "dask", "tcp://there"),
+        ({"scheduler": ""}, "dask", ""),
+    ],
+)
+def test_means_are_given_the_work_and_how_long_a_job_may_be_silent(monkeypatch, means, kind, processes):
+    monkeypatch.setattr(run.os, "cpu_count", lambda: 5)
+    monkeypatch.setattr(run, "LocalEngine", lambda *given: ("local", *given))
+    monkeypatch.setattr(run, "DaskEngine", lambda *given: ("dask", *given))
+    assert run.Means(**means).engine(b"s", 2.5) == (kind, b"s", "microrad.campaign.work:Work", processes, 2.5)
+    monkeypatch.setattr(run.os, "cpu_count", lambda: None)
+    assert run.Means().engine(b"s", 2.5)[3] == 1
+
+
+@pytest.mark.parametrize(
+    ("done", "here", "began_s", "now_s", "total", "shown", "words"),
+    [
+        (0, 0, 0.0, 9.0, 10, "margin 1 %: 2 dB", "rows"),
+        (4, 4, 9.0, 9.0, 10, "margin 1 %: 2 dB", "rows"),
+        (30, 10, 5.0, 9.0, 40, "", "2.5 rows/s, 4 s left"),
+        (30, 10, 5.0, 9.0, 30, "margin 1 %: 2 dB", "2.5 rows/s, 0 s left, margin 1 %: 2 dB"),
+        (1000, 4, 1.0, 9.0, 100000, "", "0.5 rows/s, 55.0 h left"),
+        (100, 80, 8.0, 9.0, 19300, "", "80 rows/s, 4 min left"),
+    ],
+)
+def test_the_pace_of_a_sitting_is_that_of_its_own_rows(monkeypatch, done, here, began_s, now_s, total, shown, words):
+    monkeypatch.setattr(run.time, "monotonic", lambda: now_s)
+    pace = run._Pace(done, 100.0, began_s, here)
+    assert pace.words(total, shown) == words
+    assert pace.seconds == 100.0 + now_s - began_s
+
+
+def test_a_campaign_is_begun_with_its_work_in_chunks_that_were_timed_and_resumed_as_it_was_begun(monkeypatch, tmp_path):
+    asked, file = [], tmp_path / "campaign.toml"
+    file.write_text("", encoding="utf-8")
+
+    @dataclass(frozen=True)
+    class File:
+        table: object
+        chunk_rows: int | None = None
+
+    campaign = File(SimpleNamespace(row_limit_s=70.0))
+    plan = SimpleNamespace(is_timed=True, timed_chunk=lambda row_s: int(8 * row_s))
+    book = SimpleNamespace(
+        head=SimpleNamespace(bundle=b"kept", hashes={"code": "x"}), notes=lambda: {"file": str(file)}
+    )
+    ledgers = SimpleNamespace(
+        create=lambda *given: asked.append(("create", *given)) or nullcontext(book),
+        open=lambda path, write: asked.append(("open", path, write)) or nullcontext(book),
+    )
+    engine = lambda spec, late_s: asked.append((spec, late_s)) or SimpleNamespace(close=lambda: asked.append("closed"))  # noqa: E731
+    runner = lambda *given: SimpleNamespace(run=lambda: asked.append(("run", given[0], given[2], given[3])))  # noqa: E731
+    for name, fake in {
+        "load_campaign": lambda path: asked.append(("load", path)) or campaign,
+        "planned": lambda of: plan,
+        "row_s": lambda of: 0.5,
+        "controllers": lambda of, on_progress: asked.append(("tune", of.chunk_rows, on_progress)) or "tuned",
+        "refuse_existing": lambda path: asked.append(("refuse", path)),
+        "_head": lambda of, spec: ("head", of.chunk_rows, spec),
+        "_Runner": runner,
+        "Ledger": ledgers,
+        "sweep_scratch": lambda name: asked.append(("sweep", name)),
+        "check_same": lambda *given: asked.append(("same", *given)),
+        "verify": lambda path: SimpleNamespace(sound=path.name == "sound"),
+        "mend": lambda path: asked.append(("mend", path)),
+    }.items():
+        monkeypatch.setattr(run, name, fake)
+    opened = SimpleNamespace(campaign=File(SimpleNamespace(row_limit_s=5.0), 2))
+    monkeypatch.setattr(run.bundle, "packed", lambda of, tuned: ("packed", of.chunk_rows, tuned))
+    monkeypatch.setattr(run.bundle, "opened", lambda spec, any_code: asked.append((spec, any_code)) or opened)
+    monkeypatch.setattr(run.bundle, "hashes", lambda of: {"of": of.chunk_rows})
+    path, means = tmp_path / "book", SimpleNamespace(engine=engine)
+    spec, timed = ("packed", 4, "tuned"), replace(campaign, chunk_rows=4)
+    run.run_campaign(file, path, means, "told")
+    assert [each for each in asked if each[0] not in ("refuse", "load")] == [
+        ("tune", 4, "told"),
+        (spec, 100.0),
+        ("create", path, ("head", 4, spec), {"file": str(file.resolve())}),
+        ("run", timed, book, "told"),
+        "closed",
+        ("sweep", "campaign"),
+    ]
+    assert ("refuse", path) in asked and ("load", file) in asked
+    for name, here in (("sound", True), ("damaged", False)):
+        asked.clear()
+        if not here:
+            file.unlink()
+        path = tmp_path / name
+        run.resume_campaign(path, means, "told")
+        assert asked == [
+            *([] if here else [("mend", path)]),
+            ("open", path, True),
+            (b"kept", True),
+            *([("load", file)] if here else []),
+            ("same", {"code": "x"}, {"of": None if here else 2}, path),
+            (b"kept", 35.0),
+            ("run", opened.campaign, book, "told"),
+            "closed",
+            ("sweep", "campaign"),
+        ]
+
+
+def test_rows_of_an_evaluator_have_their_columns_failures_and_curves_whichever_group_they_were_in(monkeypatch):
+    """Rows 10 to 14: 10 and 11 share a loop; 12 fails once, 13 always."""
+    monkeypatch.setattr(rows_evaluator.kernels, "BINS", 2)
+    made = object.__new__(Evaluator)
+    table = SimpleNamespace(row_limit_s=9.0, seed=41, loop=object(), tail=None)
+    made.campaign, made.names = SimpleNamespace(table=table), ("margin", "outage")
+    columns = {"power": np.arange(5.0) + 0.5}
+    drawn = SimpleNamespace(
+        weight=np.array([1.0, 2.0, 0.5, 4.0, 8.0]), columns=columns, files=[0] * 5, keys=list("aabca")
+    )
+    made._drawn = lambda cell, rows: drawn
+    tried = []
+
+    def evaluate(of, group, watch, kept, exceeded):
+        tried.append(list(group))
+        lost = {i: f"lost {len(tried)}" for i in group if i == 3 or (i == 2 and len(tried) == 2)}
+        for i in group:
+            if i not in lost:
+                kept["margin"][i], kept["outage"][i] = 10.0 * i, 0.125 * i
+                exceeded[i] = np.array([1.0, 0.25 * i])
+        return lost
+
+    made._evaluate = evaluate
+    found = made.rows(3, range(10, 15), None, number=7)
+    assert tried == [[0, 1], [2], [2], [3], [3], [4]]
+    assert (found.cell, found.number, list(found.columns)) == (3, 7, ["row", "weight", "power", "margin", "outage"])
+    assert [each.tolist() for each in found.columns.values()][:3] == [
+        [10.0, 11.0, 12.0, 13.0, 14.0],
+        [1.0, 2.0, 0.5, 4.0, 8.0],
+        [0.5, 1.5, 2.5, 3.5, 4.5],
+    ]
+    np.testing.assert_array_equal(found.columns["margin"], [0.0, 10.0, 20.0, math.nan, 40.0])
+    np.testing.assert_array_equal(found.columns["outage"], [0.0, 0.125, 0.25, math.nan, 0.5])
+    assert [(f.row, f.seed, f.attempts, f.reason) for f in found.failed] == [(13, 41, 2, "lost 5")]
+    assert (found.survival.tolist(), found.survival_square.tolist()) == ([4.0, 1.75], [4.0, 1.3125])
+    tried.clear()
+    once = made.rows(3, range(10, 15), None, attempts=1)
+    assert [(f.row, f.attempts, f.reason) for f in once.failed] == [(12, 1, "lost 2"), (13, 1, "lost 3")]
+    assert (once.number, tried) == (0, [[0, 1], [2], [3], [4]])
+    table.loop = None
+    tried.clear()
+    assert (made.rows(3, range(10, 15), None).survival.size, tried[0], tried[-1]) == (0, [0], [4])
+
+
+def test_joined_chunks_have_the_number_of_the_first_and_the_failures_of_all():
+    def chunk(number, rows, failed, curve):
+        columns = {"row": np.array(rows), "margin": 2.0 * np.array(rows)}
+        lost = tuple(records.Failed(row, 1, 2, f"of {row}") for row in failed)
+        return records.Chunk(4, number, columns, lost, np.array(curve), 3.0 * np.array(curve))
+
+    found = records.joined(
+        [chunk(6, [8.0], [8], []), chunk(2, [3.0, 5.0], [], [1.0, 0.5]), chunk(9, [7.0], [7], [0.5, 2.0])]
+    )
+    assert (found.cell, found.number, [each.row for each in found.failed]) == (4, 6, [8, 7])
+    assert {name: each.tolist() for name, each in found.columns.items()} == {
+        "row": [8.0, 3.0, 5.0, 7.0],
+        "margin": [16.0, 6.0, 10.0, 14.0],
+    }
+    assert (found.survival.tolist(), found.survival_square.tolist()) == ([1.5, 2.5], [4.5, 7.5])
+    bare = records.joined([chunk(6, [8.0], [8], [])] * 2)
+    assert (bare.survival.size, bare.survival_square.size, len(bare.failed)) == (0, 0, 2)
+
+
+@pytest.mark.parametrize(
+    ("values", "label"),
+    [({}, ""), ({"a": "5 cm"}, "a = 5 cm"), ({"b": "1", "a": "[2, true]"}, "b = 1, a = [2, true]")],
+)
+def test_a_cell_is_told_by_the_values_of_its_grid_in_their_order(values, label):
+    assert records.CellSummary(values, 0, 0, {}, None, {}, None).label == label
+
+
+@pytest.mark.parametrize(("least", "most", "is_least"), [(3.0, None, True), (None, 3.0, False), (0.0, 9.0, True)])
+def test_the_worst_of_a_limit_with_a_least_is_the_least_be_it_0(least, most, is_least):
+    assert records.Limit("margin", least, most, "").worst_is_least is is_least
+
+
+@pytest.mark.parametrize("looped", [False, True])
+def test_each_output_of_a_row_comes_from_its_own_part_of_the_mission(monkeypatch, looped):
+    asked = []
+    requirement = SimpleNamespace(margin_db=3.0, pointing_error_rad=2e-5)
+    given = {"requirement": requirement, "beacon": "a beacon", "answer": "an answer", "fine_pointing": "fine"}
+    m = load_mission(SHIPPED).mission.model_copy(update=given)
+    file = SimpleNamespace(mission=m, sources="sources")
+    under = SimpleNamespace(margin_db=4.5, outage_loss_db=7.0, short_of=lambda margin: 0.125 + margin)
+    fakes = {
+        "_exposure": lambda data, runs: asked.append(("exposure", data, runs)) or under,
+        "_day": lambda of, exposure: (
+            asked.append(("day", of is file)) or SimpleNamespace(capacity_bit=8e9, contact_s=600.0)
+        ),
+        "_margin_under_fades": lambda of, data: {"data": 2.5}[data],
+        "_rate": lambda data, loss: 1e6 * loss,
+        "_optical_bit": lambda of: 9e9,
+        "_beam_margin": lambda of: {("beacon", "shared", "a beacon", "sources"): 1.5}.get(of, 1.75),
+    }
+    for name, fake in fakes.items():
+        monkeypatch.setattr(evaluate, name, fake)
+    monkeypatch.setattr(evaluate.link, "of", lambda of: asked.append("link") or "data")
+    monkeypatch.setattr(evaluate.link, "Shared", SimpleNamespace(of=lambda of: "shared"))
+    monkeypatch.setattr(evaluate._Beam, "of", lambda *of: of)
+    monkeypatch.setattr(evaluate.controller_study, "table", lambda of: SimpleNamespace(quantile={"fine": 0.75}[of]))
+    counts = {
+        kernels.COUNT_LOST: 0.1, kernels.COUNT_SATURATED: 0.2, kernels.COUNT_CLAMPED: 0.3, kernels.COUNT_OUTSIDE: 0.4
+    }  # fmt: skip
+    runs = SimpleNamespace(
+        radial_rms_rad=1e-6, largest_rad=np.array([3e-6, 5e-6, 4e-6]), quantile_rad=lambda share: 1e-6 * share,
+        beyond=lambda radius: 1e3 * radius, share=counts.get,
+    )  # fmt: skip
+    of_links = {
+        "margin": 4.5, "margin_under_fades": 2.5, "outage": 0.125, "short": 3.125, "data_rate": 7e6,
+        "beacon_margin": 1.5, "answer_margin": 1.75, "volume": 8e9, "contact_time": 600.0, "optical_volume": 9e9,
+    }  # fmt: skip
+    of_loops = {
+        "residual_rms": 1e-6, "residual_quantile": 0.75e-6, "residual_largest": 5e-6, "beyond_share": 0.02,
+        "lost_share": 0.1, "saturated_share": 0.2, "beyond_rate_share": 0.3, "outside_share": 0.4,
+    }  # fmt: skip
+    wanted = of_loops | of_links if looped else of_links
+    found = evaluate.outputs(file, runs if looped else None, wanted)
+    assert (list(found), found) == (list(wanted), pytest.approx(wanted))
+    assert asked == ["link", ("exposure", "data", runs if looped else None), ("day", True)], "each part once"
+    asked.clear()
+    assert evaluate.outputs(file, None, ("answer_margin", "beacon_margin")) == {
+        "beacon_margin": 1.5,
+        "answer_margin": 1.75,
+    }
+    assert asked == [], "nothing is computed for any other"
+
+
+def test_a_link_that_no_rate_closes_carries_nothing(monkeypatch):
+    def none(*given):
+        raise evaluate.link.LinkError("no rate has that margin")
+
+    monkeypatch.setattr(evaluate.link, "rate_at_loss", none)
+    assert evaluate._rate(SimpleNamespace(requirement=SimpleNamespace(margin_db=3.0)), 1.0) == 0.0
+
+
+def test_the_day_of_a_row_is_taken_under_its_own_pointing(monkeypatch):
+    from microrad.link import study as link_study
+    from microrad.orbit import day as day_study
+
+    file = SimpleNamespace(path=Path("there/m.toml"), sources="sources")
+    monkeypatch.setattr(link_study, "run_link_study", lambda of: ("links", of))
+    monkeypatch.setattr(day_study, "relay", lambda *given: given)
+    monkeypatch.setattr(day_study, "optical_alone", lambda of: SimpleNamespace(capacity_bit={file.path: 7e9}[of.path]))
+    under = SimpleNamespace(outage_loss_db=2.5, short_of=lambda margin: 0.25 + margin)
+    links, loss = evaluate._day(file, under)
+    assert (links, loss) == (("links", file), day_study.PointingLoss(2.5, 0.25, "campaign"))
+    assert evaluate._optical_bit(file) == 7e9
+    asked = []
+    monkeypatch.setattr(
+        evaluate, "fading_of", lambda *given: asked.append(given) or SimpleNamespace(margin_left_db=-1.25)
+    )
+    assert (evaluate._margin_under_fades(file, "data"), asked) == (-1.25, [("data", Path("there"), "sources")])
+
+
+@pytest.mark.parametrize("sky", [None, "a sky"])
+def test_a_beam_is_the_same_by_its_tables_and_what_it_passes_through(sky):
+    shared = SimpleNamespace(sky=sky, outage=0.125, point_ahead_rad=2e-5, terminals="both", conventions="ours")
+    beam = evaluate._Beam.of("beacon", shared, "a table", {"a": 1})
+    air = None if sky is None else (sky, 0.125)
+    assert (beam.name, beam.tables) == ("beacon", ("a table", 2e-5, "both", "ours", air))
+    assert (beam.shared, beam.beam, beam.sources) == (shared, "a table", {"a": 1})
+    other = SimpleNamespace(**{**vars(shared), "unread": 3})
+    assert beam == evaluate._Beam.of("beacon", other, "a table", {}) and hash(beam) == hash(
+        evaluate._Beam.of("beacon", other, "a table", {})
+    )
+    assert beam != evaluate._Beam.of("answer", shared, "a table", {"a": 1})
+    assert beam != evaluate._Beam.of(
+        "beacon", SimpleNamespace(**{**vars(shared), "point_ahead_rad": 0.0}), "a table", {}
+    )

@@ -1,6 +1,7 @@
 """The random numbers of a campaign: their distributions, how they fill the cube, and that any row can be had alone."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -349,3 +350,43 @@ def test_a_share_of_the_draws_stays_below_its_value_which_has_its_density(of, sh
 )
 def test_a_distribution_in_words_has_its_numbers_in_their_unit(of, unit, words):
     assert of.words(unit) == words
+
+
+@pytest.mark.parametrize(("seed", "number"), [(3, 0), (3, 1), (2**40, 7)])
+def test_points_of_sobol_are_in_the_middle_of_the_cells_of_their_grid_and_stay_as_they_are(seed, number):
+    points = sampling._block("sobol", seed, 32, 3, number)
+    places = points * 2.0**31
+    assert np.all(places % 2.0 == 1.0) and np.all((points > 0.0) & (points < 1.0))
+    with pytest.raises(ValueError, match="read-only"):
+        points[0, 0] = 0.5
+    np.testing.assert_array_equal(np.sort(np.floor(32.0 * points), axis=0), np.tile(np.arange(32.0)[:, None], 3))
+
+
+def test_points_of_a_hypercube_at_the_ends_are_drawn_in_by_a_bit(monkeypatch):
+    given = np.array([[0.0, 1.0], [0.25, 0.5], [2.0**-60, 1.0 - 2.0**-54]])
+    monkeypatch.setattr(
+        "scipy.stats.qmc.LatinHypercube", lambda *of, **more: SimpleNamespace(random=lambda count: given)
+    )
+    found = sampling._block("latin-hypercube", 2**50 + 11, 4, 2, 5)
+    assert found.tolist() == [[2.0**-54, 1.0 - 2.0**-53], [0.25, 0.5], [2.0**-54, 1.0 - 2.0**-53]]
+
+
+@pytest.mark.parametrize(("dimensions", "count"), [(0, 5), (3, 0), (0, 0)])
+@pytest.mark.parametrize("method", METHODS)
+def test_no_inputs_and_no_rows_have_no_points_in_their_shape(method, dimensions, count):
+    assert sampling.uniform(method, 1, 16, dimensions, 7, count).shape == (count, dimensions)
+
+
+def test_words_of_64_bits_lie_in_the_middle_of_steps_of_52_bits():
+    raw = np.array([0, 2**12 - 1, 2**12, 2**63, 2**64 - 1], dtype=np.uint64)
+    assert sampling._open_unit(raw).tolist() == [2.0**-53, 2.0**-53, 3.0 * 2.0**-53, 0.5 + 2.0**-53, 1.0 - 2.0**-53]
+
+
+def test_random_rows_of_five_numbers_have_two_blocks_of_words_each():
+    whole = sampling.uniform("random", 9, 16, 5, 0, 6)
+    raw = np.random.Philox(key=9 | 1 << 64, counter=0).random_raw(48).reshape(6, 8)[:, :5]
+    np.testing.assert_array_equal(whole, ((raw >> np.uint64(12)) + 0.5) * 2.0**-52)
+    np.testing.assert_array_equal(sampling.uniform("random", 9, 16, 5, 2, 3), whole[2:5])
+    np.testing.assert_array_equal(
+        sampling.uniform("random", 9, 16, 4, 0, 2)[1], sampling.uniform("random", 9, 16, 4, 1, 1)[0]
+    )

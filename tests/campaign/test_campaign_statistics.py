@@ -12,7 +12,7 @@ from scipy import stats
 
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.records import Chunk, Failed, Limit, Progress
-from microrad.campaign.statistics import summary
+from microrad.campaign.statistics import interim, summary, tails
 from microrad.campaign.statistics.cell import CellRows, _missed
 from microrad.campaign.statistics.interim import _order
 from microrad.campaign.statistics.intervals import (
@@ -30,7 +30,7 @@ from microrad.campaign.statistics.intervals import (
 )
 from microrad.campaign.statistics.summary import _sample, progress
 from microrad.core.arrays import Floats
-from microrad.core.intervals import student
+from microrad.core.intervals import binomial_band, counted, student
 from microrad.mirror import Variant
 from truths import philox
 
@@ -699,3 +699,251 @@ def test_a_campaign_is_as_far_as_the_first_round_of_all_its_cells(monkeypatch, t
     assert [(t.cell, t.row) for t in found.worst] == [(0, 1), (1, 1), (1, 0)]
     assert found.sample["margin"].tolist() == [1.0, 5.0, 2.0, 7.0, 3.0]
     assert found.sample["cell"].tolist() == [0.0, 0.0, 1.0, 1.0, 1.0]
+
+
+# -------------------------------------------------------------------------------------------------- looked at meanwhile
+class Growing(SimpleNamespace):
+    """A ledger that chunks come into: each with its mark, and what is noted of it."""
+
+    def count(self):
+        return len(self.inside)
+
+    def notes(self):
+        return dict(self.noted)
+
+    def added(self, mark):
+        return ((at, chunk) for at, chunk in self.inside if at > mark)
+
+
+@pytest.fixture
+def growing(monkeypatch):
+    """An empty ledger of two cells, how it is looked at, and what was asked for."""
+    asked, campaign = [], a_campaign(limits=(Limit("margin", 3.0, None, ""),))
+    book = Growing(inside=[], noted={"state": "waiting"}, head=SimpleNamespace(bundle=b"first"))
+    opened = lambda path, write: asked.append((path, write)) or nullcontext(book)  # noqa: E731
+    monkeypatch.setattr(interim.Ledger, "open", opened)
+    unpacked = lambda of, any_code: asked.append((of, any_code)) or SimpleNamespace(campaign=campaign)  # noqa: E731
+    monkeypatch.setattr(interim.bundle, "opened", unpacked)
+    monkeypatch.setattr(interim, "planned", lambda of: SimpleNamespace(rounds=(6, 40), chunk_rows=4))
+    told = lambda *given: SimpleNamespace(head=given[0], campaign=given[1], cells=given[3], progress=given[4])  # noqa: E731
+    monkeypatch.setattr(interim.summary, "assembled", told)
+    return book, interim.Interim("a ledger"), asked, campaign
+
+
+def of_cell(cell: int, number: int, rows, margin, failed=()) -> Chunk:
+    return replace(a_chunk(number, rows, failed, margin=margin), cell=cell)
+
+
+def test_a_look_reads_each_chunk_once_and_gives_the_same_where_nothing_is_new(growing) -> None:
+    book, look, asked, campaign = growing
+    empty = look.look()
+    assert (asked, empty.head, empty.campaign) == ([("a ledger", False), (b"first", True)], book.head, campaign)
+    assert [cell.rows for cell in empty.cells] == [0, 0]
+    assert (empty.progress.rows_done, empty.progress.rows_total, empty.progress.state) == (0, 12, "waiting")
+    assert look.look() is empty
+    book.inside += [
+        (3, of_cell(1, 0, range(4), [1.0, 2.0, 5.0, 7.0])),
+        (5, of_cell(0, 1, [4, 5], [2.0, math.nan], [5])),
+    ]
+    book.noted |= {"state": "running", "seconds": 3.0}
+    some = look.look()
+    assert [(cell.rows, cell.failed, cell.missed.value) for cell in some.cells] == [(2, 1, 1.0), (4, 0, 0.5)]
+    assert [list(cell.outputs) for cell in some.cells] == [[], ["margin"]], "that of the cell that misses least alone"
+    assert some.progress == Progress(6, 12, 3.0, 2.0, 3.0, "running")
+    assert look.look() is some
+    book.inside.append((6, of_cell(0, 0, range(4), [4.0, 4.5, 5.0, 6.0])))
+    more = look.look()
+    assert [(cell.rows, cell.missed.value) for cell in more.cells] == [(6, 0.2), (4, 0.5)]
+    assert [list(cell.outputs) for cell in more.cells] == [["margin"], []]
+    book.noted["state"] = "complete"
+    assert look.look().progress == Progress(10, 10, 3.0, 10.0 / 3.0, 0.0, "complete")
+    assert [each for each in asked if each[0] == b"first"] == [(b"first", True)], "opened once"
+
+
+def test_a_look_without_patience_reads_one_chunk_and_counts_the_others_as_whole(growing) -> None:
+    book, look, _, _ = growing
+    book.inside += [(k + 1, of_cell(0, k, range(4 * k, 4 * k + 4), [1.0, 2.0, 3.0, 4.0])) for k in range(3)]
+    seen = [look.look(-1.0) for _ in range(4)]
+    assert [each.cells[0].rows for each in seen] == [4, 8, 12, 12]
+    assert [each.progress.rows_done for each in seen] == [12, 12, 12, 12]
+    assert seen[3] is seen[2]
+
+
+@pytest.mark.parametrize("change", ["another head", "fewer chunks"])
+def test_a_ledger_that_is_another_by_now_is_read_from_its_begin(growing, change) -> None:
+    book, look, asked, _ = growing
+    book.inside += [(1, of_cell(0, 0, range(4), [1.0, 2.0, 3.0, 4.0])), (2, of_cell(1, 0, range(4), [5.0] * 4))]
+    before = look.look()
+    if change == "another head":
+        book.head = SimpleNamespace(bundle=b"second")
+    else:
+        book.inside.pop(0)
+    after = look.look()
+    assert after is not before and after.head is book.head
+    assert [cell.rows for cell in after.cells] == ([4, 4] if change == "another head" else [0, 4])
+    assert [each[0] for each in asked if each[1] is True] == [b"first", book.head.bundle]
+
+
+def test_a_summary_of_a_cell_has_the_limits_that_any_row_misses_over_its_good_rows() -> None:
+    limits = (Limit("margin", 3.0, 9.0, ""), Limit("outage", None, 0.25, ""))
+    campaign = a_campaign(("margin", "outage"), limits=limits)
+    given = {"margin": [2.0, 3.0, 9.0, 9.5, math.nan, 4.0], "outage": [0.5, 0.25, 0.26, 0.0, math.nan, 0.1]}
+    cell = CellRows(campaign, 0, [a_chunk(0, range(6), [4], **given)])
+    found = cell.summary((0.25, 0.75))
+    assert (found.values, found.rows, found.failed, found.tail) == ({"distance": "40000 km"}, 6, 1, None)
+    assert found.missed == proportion_interval(3.0, 5.0, 0.95)
+    assert found.missed_by == {name: proportion_interval(2.0, 5.0, 0.95) for name in ("margin", "outage")}
+    assert [(o.name, o.rows, o.least, o.most, list(o.quantiles)) for o in found.outputs.values()] == [
+        ("margin", 5, 2.0, 9.5, [0.25, 0.75]),
+        ("outage", 5, 0.0, 0.5, [0.25, 0.75]),
+    ]
+    assert ends(found.outputs["margin"].mean) == pytest.approx(
+        ends(mean_interval(moments(np.array(given["margin"])), 0.95))
+    )
+    bare = cell.summary(())
+    assert (bare.outputs, bare.tail, bare.missed) == ({}, None, found.missed)
+    campaign.table.sampling = "sobol"
+    blocks = block_means(np.arange(6.0), np.array(given["margin"]), np.ones(6), 2)
+    assert cell.summary().outputs["margin"].mean == mean_interval(moments(np.array(given["margin"])), 0.95, blocks)
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_a_cell_of_no_rows_says_that_nothing_is_known(loop) -> None:
+    campaign = a_campaign()
+    campaign.table.loop = object() if loop else None
+    for cell in (CellRows(campaign, 1), CellRows(campaign, 1, [a_chunk(0, [0, 1], [0, 1], margin=[math.nan] * 2)])):
+        found = cell.summary()
+        assert (found.values, found.tail, found.rows == found.failed) == ({}, None, True)
+        assert math.isnan(found.missed.value) and cell.worth == 0.0 and not cell.is_precise()
+        assert cell.precision_words() == ""
+
+
+def test_the_tail_of_a_cell_is_that_of_its_good_rows_or_of_its_weighted_draws(monkeypatch) -> None:
+    asked = []
+    monkeypatch.setattr(
+        tails, "tail_of_time", lambda *given: asked.append(given) or SimpleNamespace(wanted={0.125: "w"})
+    )
+    monkeypatch.setattr(tails, "tail_weighted", lambda *given: asked.append(given))
+    campaign = a_campaign()
+    campaign.table.loop = object()
+    chunks = [a_chunk(0, [0, 1], [1], survival=[1.5, 0.25], margin=[4, math.nan]), a_chunk(1, [2], margin=[5])]
+    CellRows(campaign, 0, [chunks[0], replace(chunks[0], number=1)]).summary()
+    (sums, squares, good, edges, shares, confidence), _ = asked.pop(), asked.clear()
+    assert (sums.tolist(), squares.tolist(), good, confidence) == ([3.0, 0.5], [4.5, 0.125], 2, 0.99)
+    assert edges.size > 100 and shares == (0.1, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)
+    campaign.table.precision = SimpleNamespace(output="radius", quantile=0.875, confidence=0.8)
+    assert CellRows(campaign, 0, chunks)._precision() == "w"
+    assert (asked[0][2], asked[0][4], asked.pop()[5]) == (2, (0.125,), 0.8)
+    campaign.table.tail, campaign.limits = SimpleNamespace(error_rad=2e-5, probability=1e-7), ()
+    campaign.outputs = []
+    CellRows(
+        campaign, 0, [a_chunk(0, [0, 1, 2], tail_radius=[1e-6, math.nan, 3e-6], tail_log_weight=[-1, -2, -4])]
+    ).summary()
+    ((radius, log_weight, *rest),) = asked
+    assert (radius.tolist(), log_weight.tolist(), rest) == ([1e-6, 3e-6], [-1.0, -4.0], [(1e-7,), 0.99, (2e-5,)])
+
+
+@pytest.mark.parametrize(
+    ("limits", "order"),
+    [
+        ((), [(0, 2), (0, 5), (0, 1), (1, 0)]),
+        ((Limit("margin", 3.0, None, ""),), [(0, 2), (0, 5), (0, 1), (1, 0)]),
+        ((Limit("margin", 3.0, 9.0, ""),), [(0, 2), (0, 5), (0, 1), (1, 0)]),
+        ((Limit("margin", None, 9.0, ""), Limit("outage", 0.0, None, "")), [(0, 1), (0, 2), (0, 5), (1, 0)]),
+    ],
+)
+def test_traces_of_equal_values_stand_by_their_rows(limits, order) -> None:
+    traces = [
+        SimpleNamespace(cell=c, row=r, value=v) for c, r, v in ((1, 0, 0.5), (0, 5, 2.0), (0, 1, 7.5), (0, 2, 2.0))
+    ]
+    assert [(t.cell, t.row) for t in summary._worst_first(limits, traces)] == order
+
+
+@pytest.mark.parametrize(
+    ("failed", "beyond", "outside", "weights", "told"),
+    [
+        ([], 0.0, 0.0, None, []),
+        ([1], 0.0, 1e-9, None, ["1 of 3 rows have no", "In some rows the drive leaves"]),
+        ([], 0.5, 0.0, [1.0, 1.0, 4.0], ["In some rows the mirror moves faster", "worth 2 equal ones."]),
+    ],
+)
+def test_each_warning_of_rows_has_its_own_cause(failed, beyond, outside, weights, told) -> None:
+    names = ("margin", "beyond_rate_share", "outside_share")
+    draw = SimpleNamespace(drawn_as=None if weights is None else object())
+    campaign = a_campaign(names, draws=(SimpleNamespace(drawn_as=None), draw))
+    margin = [math.nan if row in failed else 4.0 for row in range(3)]
+    given = {"margin": margin, "beyond_rate_share": [0.0, 0.0, beyond], "outside_share": [0.0, outside, 0.0]}
+    found = summary._warnings(
+        campaign, [CellRows(campaign, 0), CellRows(campaign, 1, [a_chunk(0, range(3), failed, weights, **given)])]
+    )
+    assert [words in each for words, each in zip(told, found, strict=True)] == [True] * len(told)
+
+
+@pytest.mark.parametrize(
+    ("share", "size", "rows", "low_at", "high_at"),
+    [
+        ([1.0, 0.5, 0.25, 0.0], [math.nan, 40.0, 30.0, math.nan], 20, 0, 3),
+        ([0.75, 0.75, 1e-3], [9.0, 8.0, 7.0], 3, 1, 2),
+    ],
+)
+def test_a_band_has_the_events_of_its_sizes_with_the_correction_for_few_rows(
+    share, size, rows, low_at, high_at
+) -> None:
+    share, size = np.array(share), np.array(size)
+    band = tails._band(share, size, rows, 0.9)
+    worth = np.where(np.isnan(size), rows, size)
+    few = counted(rows, 0.9)
+    low, high = binomial_band(share * worth * few, worth * few, 0.9)
+    assert (band.share.tolist(), band.size.tolist()) == (share.tolist(), worth.tolist())
+    assert band.low[low_at] == pytest.approx(max(low[low_at:])) and band.high[high_at] == pytest.approx(
+        min(high[: high_at + 1])
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "weights", "share", "found"),
+    [
+        ([3.0, 1.0, 2.0], None, 0.34, 2.0),
+        ([3.0, 1.0, 2.0], None, 1 / 3, 1.0),
+        ([3.0, 1.0, 2.0], [5.0, 1.0, 2.0], 0.375, 2.0),
+        ([3.0, 1.0, 2.0], [5.0, 1.0, 2.0], 0.376, 3.0),
+        ([3.0, math.nan, 2.0], [5.0, 90.0, 2.0], 0.0, 2.0),
+        ([-math.inf, 1.0], None, 0.5, -math.inf),
+        ([math.nan], None, 0.5, math.nan),
+        ([4.0], [0.25], 1.0, 4.0),
+    ],
+)
+def test_a_quantile_is_the_least_value_that_its_share_of_the_weight_is_up_to(values, weights, share, found) -> None:
+    rows = ordered(np.array(values), None if weights is None else np.array(weights))
+    assert rows.quantile(share) == found or (math.isnan(found) and math.isnan(rows.quantile(share)))
+
+
+@pytest.mark.parametrize(
+    ("rows", "block", "count", "mean"),
+    [
+        ([0, 1, 2, 3, 4], 2, 2, 2.5),
+        ([1, 2, 3, 4, 5], 2, 2, 3.5),
+        ([2, 3, 4, 5, 9], 4, 0, math.nan),
+        ([4, 5, 6, 7, 8], 4, 1, 2.5),
+        ([0, 1, 2, 3, 4], 1, 5, 3.0),
+    ],
+)
+def test_blocks_begin_at_multiples_of_their_rows_whichever_row_is_first(rows, block, count, mean) -> None:
+    values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+    found = block_means(np.array(rows, dtype=float), values, np.ones(5), block)
+    assert found.count == count and (found.mean == mean or math.isnan(mean))
+
+
+def test_the_mean_of_weighted_rows_is_worth_its_squares() -> None:
+    """By the definition of each field, with numbers unlike each other."""
+    x, w = np.array([2.0, -1.0, 5.0, 0.5]), np.array([0.5, 2.0, 1.25, 4.0])
+    found, mean = moments(x, w), float(np.sum(x * w) / np.sum(w))
+    off = x - mean
+    assert astuple(found) == pytest.approx(
+        (4, 7.75, 21.8125, mean, np.sum(w * off**2), np.sum(w**2 * off), np.sum((w * off) ** 2), -1.0, 5.0), rel=1e-12
+    )
+    assert found.variance == pytest.approx(np.sum(w * off**2) / (7.75 - 21.8125 / 7.75), rel=1e-12)
+    assert found.mean_variance == pytest.approx(np.sum((w * off) ** 2) / 7.75**2 * 4.0 / 3.0, rel=1e-12)
+    assert found.deviation == math.sqrt(found.variance)
+    lone = moments(np.array([3.0]), np.array([0.5]))
+    assert math.isnan(lone.variance) and math.isnan(lone.mean_variance) and lone.mean == 3.0

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import pkgutil
+import re
 import shlex
 import signal
 import subprocess
@@ -2185,3 +2186,315 @@ def test_a_name_that_begins_like_an_option_is_led_by_its_folder_in_the_next_comm
     monkeypatch.setattr("microrad.lab.bench.load_plan", lambda plan: SimpleNamespace(name=plan))
     monkeypatch.setattr("microrad.lab.bench.write_folder", lambda *given: [])
     assert call("bench", "plan.toml", "--output=-b").out.endswith("Next: microrad identify ./-b\n")
+
+
+# ------------------------------------------------------------------------------- what else a command line may say
+@pytest.mark.parametrize(
+    ("names", "called"),
+    [
+        ("60Hz.csv|80Hz.csv", "work"),
+        ("a/loop-1.csv|b/loop-2.csv", "loop"),
+        ("a/x.csv|b/y.csv", "x"),
+        ("tip10.csv|tip1.csv", "tip"),
+        ("mirror_a_1.csv|mirror_a_2.npy|mirror_b.csv", "mirror"),
+        ("one.csv|deep/one.tdms", "one"),
+        ("ab1.csv|ab2.csv", "work"),
+        ("only.tar.gz", "only.tar"),
+        ("scan 1.csv|scan 12.csv|scan.csv", "scan"),
+    ],
+)
+def test_a_mirror_is_called_by_whole_words_that_all_files_begin_with(tmp_path, monkeypatch, names, called):
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    assert recordings.common_name(list(map(Path, names.split("|")))) == called
+
+
+def of_units(*units):
+    return recordings.Given(
+        tuple(
+            SimpleNamespace(
+                path=f"r{k}", output_names=("y",), output_units=(unit,), input_names=("u",), input_units=("",)
+            )
+            for k, unit in enumerate(units)
+        ),
+        (),
+    )
+
+
+@pytest.mark.parametrize(
+    ("units", "option", "found"),
+    [
+        (("um", "um"), None, ("um", "stated in the files")),
+        (("um", ""), None, ("um", "stated in the files")),
+        (("", ""), None, ("mrad", "assumed, --output-unit says otherwise")),
+        (("", ""), "urad", ("urad", "given")),
+        (("um",), "um", ("um", "given")),
+        (("um",), "mm", "--output-unit is mm and the files say um: give what the files say, or neither."),
+        (("um", "mm"), "um", "--output-unit is um and the files say mm, um: give what the files say, or neither."),
+        (("um", "mm", "um"), None, "units of the output, um (r0), mm (r1): identify them apart, or convert them."),
+    ],
+)
+def test_units_of_several_files_agree_or_are_refused(monkeypatch, units, option, found):
+    monkeypatch.setattr("microrad.lab.recording.stated_units", lambda units, names: {unit for unit in units if unit})
+    if isinstance(found, tuple):
+        assert recordings.unit_of(of_units(*units), "output", option, "mrad") == found
+        return
+    with pytest.raises(frame.Refusal, match=re.escape(found)):
+        recordings.unit_of(of_units(*units), "output", option, "mrad")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"files": "a.csv b.toml"}, "b.toml is a list of recordings: give it alone, and name the other files in it."),
+        ({"files": "a.csv", "validate": "v.toml"}, "v.toml is a list of recordings: give it alone"),
+        ({"files": "a.npy b.npy", "axes": "samples", "output_file": "y.npy"}, "given 1 times and there are 2 files of"),
+        ({"files": "a.npy", "validate": "v.npy", "axes": "samples", "output_file": "y.npy"}, "there are 2 files of dr"),
+        ({"files": "a.csv", "output_file": "y.csv"}, "--output-file is for whole arrays: say with --axes what their a"),
+        ({"files": "a.csv", "output": "y"}, "--input is missing: name the column of the drive."),
+        ({"files": "a.csv", "input": "u"}, "--output is missing: name the column of the sensor."),
+        ({"files": "a.csv"}, "--input is missing: name the column of the drive."),
+        ({"files": "a.npy", "axes": "samples", "time": "t", "input": "u v"}, "one of outputs: leave out --time."),
+        ({"files": "a.npy", "axes": "samples", "output": "y z"}, "leave out a second --input or --output."),
+    ],
+)
+def test_recordings_that_the_options_do_not_say_are_refused_by_the_first_fault(given, words):
+    said = {key: tuple(value.split()) if key not in {"axes", "time"} else value for key, value in given.items()}
+    paths = {key: tuple(map(Path, said[key])) for key in ("files", "validate", "output_file") if key in said}
+    with pytest.raises(frame.Refusal, match=re.escape(words)):
+        recordings.given_recordings(recordings.Options(**{**said, **paths}))
+
+
+@pytest.mark.parametrize(
+    ("text", "begins"),
+    [
+        ("<!DOCTYPE html>\x1b", "<!DOCTYPE html>\x1b"),
+        ("a\x1b[31mb", "a\\x1b[31mb"),
+        ("tab\tline\nend", "tab\tline\nend"),
+        ("", ""),
+        ("é µ −", "é µ −"),
+        ("< !\x07", "< !\\x07"),
+    ],
+)
+def test_a_page_alone_is_printed_with_all_that_is_in_it(capsys, text, begins):
+    assert frame._printed(text, 7) == 7
+    assert capsys.readouterr().out.replace("\\u00", "\\x") == f"{begins}\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(13, "Permission denied", "a/b.csv"), "a/b.csv: Permission denied; nothing was written there. Check f"),
+        (OSError(28, "No space left on device"), "microrad: No space left on device; nothing was written. Check free"),
+        (BrokenPipeError(32, "Broken pipe", None), "microrad: Broken pipe; nothing was written. Check free space and"),
+        (KeyboardInterrupt(), "microrad: interrupted, nothing was written\n"),
+        (frame.Refusal("a\x1bb"), "microrad: a\\"),
+    ],
+)
+def test_failures_are_told_in_one_line(capsys, error, said):
+    code = frame._failed(error)
+    err = capsys.readouterr().err
+    assert said in err and err.count("\n") == 1
+    assert code == (frame.INTERRUPTED if isinstance(error, KeyboardInterrupt) else frame.REFUSED)
+
+
+@pytest.mark.parametrize(
+    ("done", "written"),
+    [
+        (["a.toml"], "a.toml exists and is left as it is; ADVICE."),
+        (["a.toml", "--begins"], "a.toml exists and is left as it is; ADVICE, or replace it with --overwrite."),
+        (["a.toml", "--overwrite"], "a.toml exists and is left as it is; ADVICE."),
+        (["b.toml", "--overwrite", "--begins"], "b.toml was not written by microrad and is left as it is; ADVICE."),
+        (["d", "--overwrite", "--begins"], "d was not written by microrad and is left as it is; ADVICE."),
+        (["e", "--begins"], "e exists and is left as it is; ADVICE, or replace it with --overwrite."),
+        (["none/x.toml"], "none/x.toml: there is no folder none; create it first."),
+        (["a.toml/x.toml"], "a.toml/x.toml: there is no folder a.toml; create it first."),
+        (["a.toml", "--overwrite", "--begins"], ""),
+        (["new.toml"], ""),
+        (["empty", "--overwrite", "--begins"], ""),
+    ],
+)
+def test_a_target_is_refused_with_what_may_be_done(folder, done, written):
+    (folder / "a.toml").write_bytes(b"# Mine and more")
+    (folder / "b.toml").write_bytes(b"# Min")
+    (folder / "empty").touch()
+    (folder / "d").mkdir()
+    (folder / "e").symlink_to("nowhere")
+    name, *flags = done
+    given = {"overwrite": "--overwrite" in flags, "begins": b"# Mine" if "--begins" in flags else b""}
+    if not written:
+        frame.check_target(Path(name), "ADVICE", **given)
+        return
+    with pytest.raises(frame.Refusal) as caught:
+        frame.check_target(Path(name), "ADVICE", **given)
+    assert str(caught.value) == written
+
+
+@pytest.mark.parametrize(
+    ("version", "numbers"),
+    [
+        ("1.10.2", (1, 10, 2)),
+        ("2.0rc1", (2, 0, 1)),
+        ("1.2.3.4", (1, 2, 3)),
+        ("9", (9,)),
+        ("1.9.0+local7", (1, 9, 0)),
+        ("", ()),
+    ],
+)
+def test_a_version_has_its_first_three_numbers(version, numbers):
+    assert installation._numbers(version) == numbers
+
+
+@pytest.mark.parametrize(
+    ("requires", "names"),
+    [
+        (["numpy>=1.26", "rich >= 13.0,<15", "pytest>=8; extra == 'dev'", "plain"], ["microrad", "numpy", "rich"]),
+        ([], ["microrad"]),
+        (None, ["microrad"]),
+    ],
+)
+def test_libraries_without_a_floor_and_those_of_extras_are_not_looked_at(monkeypatch, requires, names):
+    asked = []
+    monkeypatch.setattr(installation.metadata, "requires", lambda name: requires)
+    monkeypatch.setattr(installation, "_library", lambda name, lowest: asked.append((name, lowest)) or (False, "old"))
+    found = list(installation._libraries())
+    assert [check.name for check in found] == names and found[0].ok
+    assert asked == [("numpy", "1.26"), ("rich", "13.0")][: len(names) - 1]
+    assert [check.advice for check in found[1:]] == [
+        f"python -m pip install '{name}>={lowest}'" for name, lowest in asked
+    ]
+
+
+def test_a_cache_that_cannot_be_written_is_a_problem_with_its_advice(monkeypatch, tmp_path):
+    from microrad.core import kernels
+
+    (tmp_path / "file").touch()
+    closed_loop = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path / "file" / "x")))
+    monkeypatch.setattr(kernels, "closed_loop", closed_loop)
+    found = installation._check("kernel cache", installation._cache, "ADVICE")
+    assert (found.ok, found.advice) == (False, "ADVICE") and found.found.startswith("NotADirectoryError: ")
+    monkeypatch.setattr(closed_loop.stats, "cache_path", str(tmp_path / "new" / "x"))
+    assert installation._cache() == (True, f"{tmp_path / 'new' / 'x'} is writable")
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--data-rate", "1 Gbit"), "--data-rate: "),
+        (("--pointing-error", "5"), "--pointing-error: "),
+        (("--pointing-error", "5 m", "--data-rate", "1 s"), "--data-rate: "),
+    ],
+)
+def test_a_value_of_the_command_line_is_refused_under_its_option(options, told):
+    from microrad.cli import link
+    from microrad.mission.file import load_link
+
+    given = dict(zip(options[::2], options[1::2], strict=True))
+    with pytest.raises(frame.Refusal) as caught:
+        link._changed(load_link(PAPER), given.get("--data-rate"), given.get("--pointing-error"))
+    assert str(caught.value).startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("rate", "error", "found"),
+    [
+        ("622.08 Mbit/s", None, (622.08e6, None)),
+        (None, "4.5 urad", (None, 4.5e-6)),
+        ("1.25 Gbit/s", "0 urad", (1.25e9, 0.0)),
+        (None, None, (None, None)),
+    ],
+)
+def test_values_of_the_command_line_stand_in_place_of_the_missions_with_their_source(rate, error, found):
+    from microrad.cli import link
+    from microrad.mission.file import load_link
+    from microrad.mission.model import Source
+
+    given = load_link(PAPER)
+    changed = link._changed(given, rate, error)
+    was, now = given.mission.communication, changed.mission.communication
+    assert now.data_rate_bit_s == pytest.approx(was.data_rate_bit_s if found[0] is None else found[0])
+    assert now.pointing_error_rad == pytest.approx(was.pointing_error_rad if found[1] is None else found[1])
+    assert now.transmit_power_w == was.transmit_power_w
+    for key, text in (("data_rate", rate), ("pointing_error", error)):
+        source = changed.sources[f"communication.{key}"]
+        said = given.sources[f"communication.{key}"] if text is None else Source(0, "command line", text)
+        assert source == said
+    assert given.sources is not changed.sources
+
+
+def test_an_option_of_times_may_be_repeated_and_is_read_in_seconds():
+    from microrad.cli.windows import time_option
+
+    made = time_option("--window", "Length;")
+    assert (made.help, made.metavar, made.show_default) == ("Length; may be repeated.", "TIME", False)
+    assert made.parser("250 ms") == 0.25
+    with pytest.raises(typer.BadParameter):
+        made.parser("3 Hz")
+
+
+@pytest.mark.parametrize(
+    ("name", "several", "table", "of"),
+    [
+        ("LQG", None, None, "one"),
+        ("PID", "both", None, "both"),
+        ("PID", "both", SimpleNamespace(mirror_file=None), "both"),
+        ("PID", "both", SimpleNamespace(mirror_file="m.toml"), "one"),
+        ("PID + inverse", "both", SimpleNamespace(mirror_file="m.toml"), "one"),
+        ("LQG", "both", SimpleNamespace(mirror_file="m.toml"), "both"),
+    ],
+)
+def test_the_papers_controllers_are_of_the_missions_own_mirror_where_its_table_names_another(
+    monkeypatch, name, several, table, of
+):
+    from microrad.cli import export
+    from microrad.export import choice
+
+    mission = SimpleNamespace(mission=SimpleNamespace(fine_pointing=table))
+    monkeypatch.setattr(choice, "choose", lambda mission, name, progress: ("one", name, progress))
+    monkeypatch.setattr(choice, "choose_coupled", lambda mission, several, name, progress: (several, name, progress))
+    assert export._chosen(mission, several, name, "progress") == (of, name, "progress")
+
+
+def test_a_group_of_commands_has_plain_help_and_its_examples():
+    made = frame.group("g", "What it is.", frame.examples("one", "two"), hidden=True)
+    assert (made.info.name, made.info.help, made.info.epilog, made.info.hidden) == (
+        *("g", "What it is.", "\b\nExamples:\n  one\n  two", True),
+    )
+    assert made.info.no_args_is_help and made.pretty_exceptions_enable is False and made.rich_markup_mode is None
+
+
+@pytest.mark.parametrize(
+    ("exposed", "browser", "raised", "said"),
+    [
+        (None, False, None, ""),
+        (None, True, None, ""),
+        ("10.0.0.1", False, None, "microrad: open to the network on 10.0.0.1, and not encrypted: who reads the addres"),
+        (None, True, OSError(28, "No space left"), "microrad: the browser was not opened (No space left); open the ad"),
+    ],
+)
+def test_the_studio_says_where_it_is_and_opens_it_if_it_can(monkeypatch, capsys, exposed, browser, raised, said):
+    import threading
+
+    from microrad.cli import studio
+    from microrad.studio import server
+
+    opened = []
+
+    def way_in(of, url):
+        if raised:
+            raise raised
+        return f"{of} {url}"
+
+    class Thread:
+        def __init__(self, target, args, daemon):
+            opened.append((target.__name__, args, daemon))
+
+        def start(self):
+            opened.append("started")
+
+    monkeypatch.setattr(server, "way_in", way_in)
+    monkeypatch.setattr(threading, "Thread", Thread)
+    studio._ready(SimpleNamespace(studio="studio"), SimpleNamespace(url="http://x"), exposed, browser)
+    out, err = capsys.readouterr()
+    assert out == "http://x\n" and err.startswith(said) and bool(err) is bool(said)
+    assert opened == ([("open", ("studio http://x",), True), "started"] if browser and not raised else [])

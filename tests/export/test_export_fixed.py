@@ -862,3 +862,55 @@ def test_the_code_of_two_axes_has_each_table_and_constant():
         "static const int64_t COUNT_MIN[TWO_FIXED_ACTUATORS] = {-312, -312};",
         "static const int64_t COUNT_MAX[TWO_FIXED_ACTUATORS] = {543, 543};",
     ]
+
+
+@pytest.mark.parametrize(
+    ("size", "word", "scale"),
+    [
+        (0.3, 2**15 - 1, 16),
+        (1.0, 2**15 - 1, 14),
+        (2.0**20, 2**15 - 1, -6),
+        (1e-320, 2**31 - 1, 1024),
+        (3e9, 2**31 - 1, -1),
+    ],
+)
+def test_a_number_is_at_the_finest_power_of_two_at_which_it_fits(size, word, scale):
+    assert fixed_form._scale(size, word) == scale
+    if size > 1e-300:
+        assert math.ldexp(size, scale) <= word < math.ldexp(size, scale + 1)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "hz"),
+    [
+        (complex(0.6, 0.799), complex(0.6, 0.8001), "368.7"),
+        (complex(0.6, -0.799), complex(0.6, -0.8001), "368.7"),
+        (complex(-0.999, 0.0), complex(-1.0, 0.0), "1250"),
+        (complex(1.0, 0.0), complex(1.0001, 0.0), "0"),
+    ],
+)
+def test_a_pole_that_leaves_the_circle_is_told_by_its_frequency_whatever_side_it_is_on(before, after, hz):
+    of, made = SimpleNamespace(name="PI", period_s=4e-4), SimpleNamespace(bits=12)
+    with pytest.raises(ExportError) as told:
+        fixed_point._refuse_poles(of, made, ((0.5, 0.5), (before, after)))
+    assert str(told.value) == (
+        f"controller 'PI' in words of 12 bits: the pole of |z| = {abs(before):.9f} at {hz} Hz moves to |z| = "
+        f"{abs(after):.9f}, and the limit is 1; give more bits (up to {fixed_point.MOST_BITS}) or less head room, or "
+        "export single precision"
+    )
+    fixed_point._refuse_poles(of, made, ((1.0, 1.0), (complex(0.6, 0.8), complex(0.6, 0.8)), (0.9, 0.999999)))
+
+
+@pytest.mark.parametrize(
+    ("x", "shift", "found"),
+    [([5, 6, -5, -6, -7], [2] * 5, [1, 2, -1, -1, -2]), ([7, -7, 0], [0, 0, 0], [7, -7, 0]), ([7, 9], [3, 1], [1, 5])],
+)
+def test_whole_numbers_are_rounded_to_the_nearest_ties_up(x, shift, found):
+    assert fixed_form._rounded(np.array(x, dtype=np.int64), np.array(shift)).tolist() == found
+
+
+def test_rows_have_each_the_finest_scale_at_which_their_sum_fits():
+    made = fixed_form._rows(np.array([[1.0, -3.0], [0.0, 0.0], [1e-9, 0.0]]), (4, 5), 2**15 - 1, [40, 21, 20])
+    weights = 1.0 / 16.0 + 3.0 / 32.0
+    assert made.scale == (math.floor(math.log2((2**15 - 1) / weights)), 21, 20)
+    assert made.value.tolist() == [[2**17 // 16, -3 * 2**17 // 32], [0, 0], [0, 0]]

@@ -1243,3 +1243,227 @@ def test_terms_begin_a_line_for_each_row_and_where_one_is_full():
         "    {4, 0, -2.0f},",
     ]
     assert terms([]) == ""
+
+
+# ------------------------------------------------------------------------------------------ from a mission to a choice
+MISSION = SimpleNamespace(name="a mission", fine_pointing="fine", mirror=SimpleNamespace(name="one", bias_v=6.25))
+MISSION_FILE = SimpleNamespace(path="m.toml", mission=MISSION, sha256="5ha")
+ORIGIN = Origin("a mission", "5ha", "one")
+
+
+def several(*biases, name="plate"):
+    """A mirror of several axes whose actuators rest at these biases."""
+    of = SimpleNamespace(name=name, axes=1)
+    return SimpleNamespace(mirror=of, actuators=[SimpleNamespace(bias_v=bias) for bias in biases])
+
+
+@pytest.fixture
+def chosen_of(monkeypatch):
+    """What `choice` makes of a mission by its parts, all of them said as they were asked for."""
+    asked = []
+    told = lambda name: lambda *given, **more: asked.append((name, *given, *more.items())) or f"{name} of {given[0]}"  # noqa: E731
+    monkeypatch.setattr(choice.controller_study, "offered", lambda table, of: ("PI", "LQG"))
+    monkeypatch.setattr(choice.mirror, "of", lambda m: f"mirrors of {m.name}")
+    monkeypatch.setattr(choice, "tracking_light_w", lambda file: 2.5e-9)
+    monkeypatch.setattr(choice, "arrival_of", lambda file: "arrival")
+    monkeypatch.setattr(choice.controller_study, "scene", told("scene"))
+    monkeypatch.setattr(choice.coupled_study, "scene", told("coupled scene"))
+    monkeypatch.setattr(choice.paper_cases, "of", told("cases"))
+    monkeypatch.setattr(choice, "_paper_loop", lambda of, cases, name: ("paper loop", of, cases, name))
+    design = SimpleNamespace(tuned="tuned", controller="controller")
+    monkeypatch.setattr(
+        choice.controller_study,
+        "design_and_promise",
+        lambda *given, only: asked.append(("design", *given, only)) or ((design, "left"),),
+    )
+    return asked
+
+
+def test_a_controller_is_chosen_among_those_of_the_study_and_the_two_of_the_paper(chosen_of):
+    assert choice.names("fine", MISSION.mirror) == ("PI", "LQG", choice.PID, choice.PID_WITH_INVERSE)
+    assert choice.names(None, MISSION.mirror) == (choice.PID, choice.PID_WITH_INVERSE)
+    own = choice.source(MISSION_FILE)
+    assert (own.path, own.origin, own.mirror, own.bias_v) == ("m.toml", ORIGIN, MISSION.mirror, 6.25)
+    found = choice.choose(MISSION_FILE, "LQG", "told")
+    assert (found.source, found.scene, found.tuned, found.controller, found.left) == (
+        *(own, f"scene of {MISSION_FILE}", "tuned", "controller", "left"),
+    )
+    assert chosen_of == [
+        ("scene", MISSION_FILE, "mirrors of a mission", 2.5e-9, "arrival"),
+        ("design", f"scene of {MISSION_FILE}", "told", ("LQG",)),
+    ]
+    for name in (choice.PID, choice.PID_WITH_INVERSE):
+        assert choice.choose(MISSION_FILE, name) == ("paper loop", own, "cases of " + str(MISSION), name)
+    assert chosen_of[2:] == [("cases", MISSION, "mirrors of a mission")] * 2
+
+
+@pytest.mark.parametrize("name", ["P", "", "lqg"])
+def test_a_controller_that_a_mission_has_not_is_refused_with_those_that_it_has(chosen_of, name):
+    with pytest.raises(ExportError) as told:
+        choice.choose(MISSION_FILE, name)
+    has = f"PI; LQG; {choice.PID}; {choice.PID_WITH_INVERSE}"
+    assert str(told.value) == f"m.toml has no controller {name!r}; it has: {has}"
+
+
+@pytest.mark.parametrize("call", ["choose", "choose_coupled", "plant_unit", "plant_unit of several"])
+def test_what_cannot_be_built_is_told_with_the_mission(chosen_of, monkeypatch, call):
+    def broken(*given, **more):
+        raise ValueError("no such loop")
+
+    for place in (choice.controller_study, choice.coupled_study):
+        monkeypatch.setattr(place, "scene", broken)
+    calls = {
+        "choose": lambda: choice.choose(MISSION_FILE, "PI"),
+        "choose_coupled": lambda: choice.choose_coupled(MISSION_FILE, several(2.0, 2.0), "PI"),
+        "plant_unit": lambda: choice.plant_unit(MISSION_FILE, "fine_pointing"),
+        "plant_unit of several": lambda: choice.plant_unit(MISSION_FILE, "fine_pointing", several(2.0)),
+    }
+    with pytest.raises(ExportError, match=r"^m\.toml: no such loop$"):
+        calls[call]()
+
+
+@pytest.mark.parametrize(
+    ("biases", "told"),
+    [((2.5, 2.5, 2.5), None), ((6.0, 2.5, 6.0), "2.5 V, 6 V"), ((-1.0, 0.0, 1e-3), "-1 V, 0 V, 0.001 V")],
+)
+def test_actuators_of_several_axes_count_from_one_bias(biases, told):
+    if told is None:
+        found = choice.source(MISSION_FILE, given := several(*biases))
+        assert (found.bias_v, found.mirror, found.origin) == (2.5, given, replace(ORIGIN, mirror="plate"))
+        return
+    with pytest.raises(ExportError) as error:
+        choice.source(MISSION_FILE, several(*biases))
+    assert str(error.value) == (
+        f"the actuators of 'plate' rest at {told}, and exported code counts all commands from one bias: give all "
+        "actuators the same, in the mirror file and in the amplifier"
+    )
+
+
+@pytest.mark.parametrize(
+    ("loop", "fine_pointing", "given", "told"),
+    [
+        (
+            "fine",
+            "fine",
+            None,
+            "m.toml has no loop 'fine': one of fine_pointing, control that is a table of the mission",
+        ),
+        (
+            *("fine_pointing", None, None),
+            "m.toml has no loop 'fine_pointing': one of fine_pointing, control that is a table of the mission",
+        ),
+        (
+            *("control", "fine", several(2.0)),
+            "the loop 'control' is of one axis, and 'plate' is a mirror of several: take fine_pointing",
+        ),
+    ],
+)
+def test_a_loop_that_a_plant_cannot_stand_in_is_refused(loop, fine_pointing, given, told):
+    file = SimpleNamespace(path="m.toml", mission=SimpleNamespace(fine_pointing=fine_pointing))
+    with pytest.raises(ExportError) as error:
+        choice.plant_unit(file, loop, given)
+    assert str(error.value) == told
+
+
+@pytest.mark.parametrize(
+    ("loop", "given", "first"),
+    [("fine_pointing", None, "one"), ("fine_pointing", several(3.5, 3.5), "plate"), ("control", None, "one")],
+)
+def test_a_plant_is_that_of_its_loop_with_its_own_mirror_and_bias(chosen_of, monkeypatch, loop, given, first):
+    def parts(name):
+        mirror = SimpleNamespace(name=name, axes=3)
+        return SimpleNamespace(
+            mirror=mirror, optics=f"{name}'s optics", drive=f"{name}'s drive", timing=f"{name}'s time"
+        )
+
+    for place, name in ((choice.controller_study, "axis"), (choice.coupled_study, "axes")):
+        monkeypatch.setattr(place, "scene", lambda *of, name=name: SimpleNamespace(loop=parts(name)))
+    paper = parts("paper")
+    setup = SimpleNamespace(drive=paper.drive, timing=paper.timing)
+    one = SimpleNamespace(source=choice.source(MISSION_FILE), mirror=paper.mirror, setup=setup)
+    monkeypatch.setattr(choice, "_paper_loop", lambda of, cases, name: one)
+    monkeypatch.setattr(choice, "_plant_unit", lambda *of: of)
+    source, mirror, optics, drive, timing = choice.plant_unit(MISSION_FILE, loop, given)
+    name = "paper" if loop == "control" else "axis" if given is None else "axes"
+    assert (source.origin.mirror, source.bias_v) == (first, 6.25 if given is None else 3.5)
+    assert (mirror.name, drive, timing) == (name, f"{name}'s drive", f"{name}'s time")
+    assert optics == f"{name}'s optics" if name != "paper" else optics.tolist() == np.eye(3).tolist()
+
+
+@pytest.mark.parametrize(
+    ("quantities", "unit"),
+    [(None, "rad"), (("angle",), "rad"), (("displacement",) * 2, "m"), (("angle", "displacement"), "")],
+)
+def test_a_plant_unit_has_steps_of_its_amplifier_and_the_unit_of_its_outputs(monkeypatch, quantities, unit):
+    given = MISSION.mirror
+    if quantities is not None:
+        given = object.__new__(choice.coupled.CoupledMirror)
+        for name, value in {
+            "outputs": tuple(SimpleNamespace(quantity=each) for each in quantities),
+            "mirror": SimpleNamespace(name="plate"),
+        }.items():
+            object.__setattr__(given, name, value)
+    monkeypatch.setattr(choice.model, "discretise", lambda of, step_s: ("discrete", of, step_s))
+    monkeypatch.setattr(choice.control, "amplifier_factor", lambda drive, step_s: 1000.0 * step_s)
+    drive = SimpleNamespace(bandwidth_hz=750.0, slew_v_s=40.0)
+    source = choice.Source("m.toml", ORIGIN, given, 6.25)
+    make = lambda: choice._plant_unit(source, "a mirror", "optics", drive, SimpleNamespace(step_s=2e-4))  # noqa: E731
+    if not unit:
+        with pytest.raises(
+            ExportError, match=r"^the outputs of 'plate' are displacements and angles, and a unit shows"
+        ):
+            make()
+        return
+    found = make()
+    assert (found.origin, found.plant, found.optics) == (ORIGIN, ("discrete", "a mirror", 2e-4), "optics")
+    assert (found.bandwidth_hz, found.follow, found.slew_step_v) == pytest.approx((750.0, 0.2, 0.008))
+    assert (found.bias_v, found.output_unit, found.element_unit) == (6.25, unit, "rad" if quantities is None else "V")
+
+
+@pytest.mark.parametrize("name", [choice.PID, choice.PID_WITH_INVERSE])
+def test_the_controller_of_the_paper_reads_and_is_given_angles_and_has_its_limits(monkeypatch, name):
+    s = lti.StateSpace(np.diag([0.5, 0.25]), np.array([[1.0], [3.0]]), np.array([[2.0, 5.0]]), np.array([[7.0]]))
+    drive = SimpleNamespace(minimum_v=-4.5, maximum_v=7.25, drive_resolution_v=0.0025)
+    setup = SimpleNamespace(controller=s, timing=SimpleNamespace(period_s=4e-4), drive=drive)
+    monkeypatch.setattr(choice, "inverse_law", lambda *of, by_difference: ("law", *of, by_difference))
+    monkeypatch.setattr(choice.control, "anti_windup", lambda of: ("windup", of))
+    monkeypatch.setattr(choice.sine_run, "margins", lambda mirror, of: ("margins", mirror, of))
+    monkeypatch.setattr(choice, "_margins", lambda of: of)
+    mirror = SimpleNamespace(axes=1, actuators=1)
+    source = choice.Source("m.toml", ORIGIN, None, 6.125)
+    found = choice._paper_controller(choice.PaperLoopChoice(source, "scenario", name, mirror, setup, "inverse"))
+    given = [(each.name, each.size, each.unit, each.meaning, each.limit) for each in found.inputs]
+    assert given == [
+        ("reading_rad", 1, "rad", "line of sight as the mirror's sensor reads it", 0.1),
+        ("reference_rad", 1, "rad", "wanted line of sight", 0.1),
+    ]
+    inverse = name == choice.PID_WITH_INVERSE
+    assert (found.name, found.origin, found.period_s, found.actuators) == (name, ORIGIN, 4e-4, 1)
+    assert found.system.B.tolist() == [[-1.0, 1.0], [-3.0, 3.0]] and found.system.A is s.A
+    assert found.system.C.tolist() == [[2.0, 5.0]] + [[0.0, 0.0]] * inverse
+    assert found.system.D.tolist() == [[-7.0, 7.0]] + [[0.0, 1.0]] * inverse
+    assert found.inverse == (("law", "inverse", 4e-4, True) if inverse else None)
+    assert (found.anti_windup, found.margins) == (("windup", s), ("margins", mirror, setup))
+    assert (found.minimum_v, found.maximum_v, found.resolution_v, found.bias_v) == (-4.5, 7.25, 0.0025, 6.125)
+    assert (found.forward, found.adaptation) == (None, None)
+
+
+@pytest.mark.parametrize("resolution", [0.0, 0.5])
+def test_a_run_of_the_paper_follows_its_fastest_sine_and_reads_in_steps_of_its_sensor(monkeypatch, resolution):
+    asked = []
+    output = np.array([[0.2], [0.3], [-0.75], [1.3]])
+    counts = SimpleNamespace(saturated=3, inverse_clamped=5)
+    trace = SimpleNamespace(output_rad=output, command_v=10.0 * output, counts=counts)
+    monkeypatch.setattr(choice.sine_run, "track", lambda *given: asked.append(given) or trace)
+    scenario = SimpleNamespace(amplitude_rad=2.0, inverse_frequencies_hz=(1.0, 4.0, 2.5))
+    setup = SimpleNamespace(
+        timing=SimpleNamespace(period_s=0.03125), drive=SimpleNamespace(sensor_resolution_rad=resolution)
+    )
+    of = choice.PaperLoopChoice(None, scenario, "PID", "mirror", setup, "inverse")
+    found = choice._paper_vectors(of, 4)
+    ((name, mirror, given, inverse, reference, kept),) = asked
+    assert (name, mirror, given, inverse, kept) == ("PID", "mirror", setup, "inverse", slice(0, 4))
+    assert_allclose(reference[:, 0], 2.0 * np.sin(2.0 * pi * 4.0 * 0.03125 * np.arange(4.0)), atol=1e-12)
+    assert found.inputs[:, 0].tolist() == ([0.2, 0.3, -0.75, 1.3] if resolution == 0.0 else [0.0, 0.5, -0.5, 1.5])
+    assert_array_equal(found.inputs[:, 1:], reference)
+    assert (found.commands.tolist(), found.saturated, found.rate_clamped) == ((10.0 * output).tolist(), 3, 5)

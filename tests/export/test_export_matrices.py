@@ -1028,3 +1028,45 @@ def test_roots_of_a_polynomial_with_some_at_zero_and_far_apart():
         coefficients = [a - root * b for a, b in zip([*coefficients, 0], [0, *coefficients], strict=True)]
     found = matrix_forms.roots([*coefficients, Fraction(0), Fraction(0)])
     assert sorted(found.real.tolist()) == [-4096.0, -1.0 / 1024.0, 0.0, 0.0, 3.0] and not found.imag.any()
+
+
+@pytest.mark.parametrize("period_s", [0.0, 1e-3])
+def test_a_gain_without_states_is_stable_and_minimal(period_s):
+    gain = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[2.5]]))
+    structure.refuse_unstable(gain, period_s, "gain")
+    structure.refuse_hidden(gain, period_s, "gain")
+    assert structure.without_copies(gain) is gain
+    entry = structure.entry_of(gain, 0, 0)
+    assert (entry.order, entry.D.tolist()) == (0, [[2.5]])
+    port = (Port("a", "V"),)
+    found = forms(LinearModel("gain", "", gain, period_s, port, port, (), None))
+    ((by_roots,),), ((by_powers,),) = found.zero_pole_gain, found.transfer_function
+    assert (by_roots.zeros.size, by_roots.poles.size, by_roots.gain, by_roots.largest_error) == (0, 0, 2.5, 0.0)
+    assert (by_powers.numerator.tolist(), by_powers.denominator.tolist(), by_powers.condition) == ([2.5], [1.0], 1.0)
+
+
+@pytest.mark.parametrize("denominator", [[1.0, 5.0], [1.0, 0.0], [1.0, 3.0, 2.0], [1.0, -0.25, 4.0, 0.0]])
+def test_a_transfer_function_has_the_condition_of_its_companion_matrix(denominator):
+    n = len(denominator) - 1
+    A = np.eye(n, k=-1)
+    A[0] = -np.array(denominator[1:])
+    entry = lti.StateSpace(A, np.eye(n)[:, :1], np.eye(n)[-1:], np.zeros((1, 1)))
+    found = matrix_forms._transfer_function(entry, *polynomials(entry), 1e-3)
+    assert found.denominator.tolist() == denominator and found.numerator.tolist() == [1.0]
+    slow = np.trim_zeros(denominator, "b")
+    companion = np.eye(len(slow) - 1, k=-1)
+    companion[:1] = -np.array(slow[1:])
+    own = np.linalg.cond(companion) if len(slow) > 1 else 1.0
+    assert found.condition == pytest.approx(own, rel=1e-9) and found.largest_error < 1e-9
+
+
+def test_roots_keep_their_digits_through_scales_of_many_decades():
+    for scale in (Fraction(1), Fraction(10**40), Fraction(1, 10**40)):
+        coefficients = [Fraction(3), -Fraction(9) * scale, Fraction(6) * scale**2, Fraction(0)]
+        found = np.sort(matrix_forms.roots(coefficients).real)
+        np.testing.assert_allclose(found, [0.0, float(scale), 2.0 * float(scale)], rtol=1e-15)
+    pair = matrix_forms.roots([Fraction(2), Fraction(-4), Fraction(10)])
+    assert sorted(pair.tolist(), key=lambda r: r.imag) == [complex(1.0, -2.0), complex(1.0, 2.0)]
+    assert matrix_forms.roots([Fraction(7)]).size == 0 and matrix_forms.roots([Fraction(7), Fraction(0)]).tolist() == [
+        0j
+    ]

@@ -682,3 +682,73 @@ def test_a_bound_grows_by_the_rise_of_its_second_half():
     assert rounding._growth(np.array([1.0, 3.0, 2.0, 2.0, 7.0])) == 2.0
     assert rounding._growth(np.array([1.0, 3.0, 2.0, 2.5])) == 0.0
     assert rounding._growth(np.array([1.0])) == rounding._growth(np.array([1.0, math.inf])) == 0.0
+
+
+# ----------------------------------------------------------------------------------- hysteresis by hand, part by part
+def test_a_feedforward_in_double_adds_a_spring_at_its_bias_and_operators_that_widen_and_bend():
+    row = np.zeros(max(kernels.PER_SIZE, kernels.POWER, kernels.BIAS, kernels.RATE_LIMIT) + 1)
+    numbers = {
+        "D1": 2.5, "D2": 0.125, "EPSILON": -0.5, "DELTA": 0.25, "ALPHA": 0.75, "BETA": 0.25, "GAMMA": 0.125,
+        "ETA": 0.0625, "RATE_LIMIT": 3.0, "BIAS": 1.5,
+    }  # fmt: skip
+    for name, number in numbers.items():
+        row[getattr(kernels, name)] = number
+    bank = SimpleNamespace(
+        step_s=0.5, drives=np.array([[1.0, 2.0, -3.0], [0.5, 0.0, 4.0]]), bouc_wen=row[None],
+        operator=np.array([[0.25, 1.0, 0.5, -0.75, 2.0, 4.0], [0.0, 9.0, 7.0, 7.0, 7.0, math.inf]]),
+        play_threshold=np.array([0.0, 0.5, 0.25]), play_weight=np.array([1.25, -2.0, 3.0]),
+        play_start=np.array([0, 2, 3]),
+    )  # fmt: skip
+    made, h, plays, before = double_run.Forward(bank, 4), 0.0, np.zeros(3), np.zeros(3)
+    for q in np.array([[1.0, 2.0, -1.0], [4.0, 6.0, 0.5], [3.75, -5.0, 0.375], [3.0, -4.75, 2.0]]):
+        travel = q - before
+        rate = np.clip(travel[0] / 0.5, -3.0, 3.0)
+        h = kernels.bouc_wen_step(h, travel[0], -0.5 * math.exp(0.25 * abs(rate)), 0.75, 0.25, 0.125, 0.0625)
+        spring = 2.5 * math.exp(-0.125 * rate) * (q[0] + 1.5) - 2.5 * 1.5 + h
+        half = np.array([0.0, 0.5 + 0.25 * min(abs(travel[1]) / 0.5, 1.0), 0.25])
+        at = q[[1, 1, 2]]
+        plays = np.maximum(at - half, np.minimum(at + half, plays))
+        s = np.clip(q[1], -4.0, 4.0) / 4.0
+        bent = 1.25 * plays[0] - 2.0 * plays[1] + 0.5 * s**2 - 0.75 * s * abs(s) + 2.0 * s**3
+        z = np.array([spring, bent, 3.0 * plays[2]])
+        np.testing.assert_allclose(made.step(q), bank.drives @ z, rtol=1e-12)
+        np.testing.assert_allclose(made.record.z[made.k - 1], z, rtol=1e-12)
+        before = q
+    assert made.record.q[:, 1].tolist() == [2.0, 6.0, -5.0, -4.75] and made.record.h[-1, 0] == h
+
+
+def test_an_inverse_in_double_has_targets_behind_creep_and_plays_that_widen_by_actuator():
+    law = SimpleNamespace(
+        by_difference=True, direct=np.array([2.0, 0.0]), bouc_wen=np.zeros((0, 12)), bouc_wen_actuator=np.zeros(0),
+        play_threshold=np.array([0.0, 0.5, 0.25]), play_weight=np.array([1.5, -0.75, 2.5]),
+        play_actuator=np.array([0, 0, 1]), widening=np.array([[0.125, 3.0], [0.0625, 100.0]]),
+        lag_keep=np.array([0.75, 0.5, 0.25]), lag_weight=np.array([0.1, 0.2, 0.3]), lag_actuator=np.array([1, 0, 1]),
+    )  # fmt: skip
+    of = SimpleNamespace(inverse=law, period_s=0.5, actuators=2, adaptation=None)
+    made = double_run.Inverse(of, 3)
+    lag, play, before = np.zeros(3), np.zeros(3), np.zeros(2)
+    for target in np.array([[1.0, -2.0], [3.0, 0.5], [2.5, 0.25]]):
+        wanted = target - [0.2 * lag[1], 0.1 * lag[0] + 0.3 * lag[2]]
+        rate = (wanted - before) / 0.5
+        wide = np.array([0.125 * min(abs(rate[0]), 3.0), 0.0625 * min(abs(rate[1]), 100.0)])
+        half = np.array([0.0, 0.5 + wide[0], 0.25 + wide[1]])
+        at = wanted[[0, 0, 1]]
+        play = np.maximum(at - half, np.minimum(at + half, play))
+        added = np.array([2.0 * wanted[0] + 1.5 * play[0] - 0.75 * play[1], 2.5 * play[2]])
+        np.testing.assert_allclose(made.step(np.array([9.0, 9.0, *target])), added, rtol=1e-12)
+        np.testing.assert_allclose(made.record.rate[made.k - 1], rate, rtol=1e-12)
+        np.testing.assert_allclose(made.record.lag[made.k - 1], lag, rtol=1e-12)
+        lag = law.lag_keep * lag + (1.0 - law.lag_keep) * added[[1, 0, 1]]
+        before = wanted
+    law.by_difference = False
+    other = double_run.Inverse(of, 1)
+    other.step(np.array([9.0, 9.0, 1.0, 2.0, 0.5, -7.0]))
+    assert other.record.rate.tolist() == [[0.5, -7.0]]
+
+
+@pytest.mark.parametrize(
+    ("rate", "wide"), [([8.0, -8.0], [0.375, 0.5]), ([-1.0, 0.0], [0.125, 0.0]), ([[2.0, 16.0]], [[0.25, 1.0]])]
+)
+def test_plays_widen_by_the_size_of_a_rate_up_to_its_limit(rate, wide):
+    law = SimpleNamespace(widening=np.array([[0.125, 3.0], [0.0625, 100.0]]))
+    assert double_run.widened(law, np.array(rate)).tolist() == wide

@@ -860,3 +860,160 @@ def test_a_first_order_model_behind_a_hold_is_found_in_closed_form():
     rate = -math.log(0.8) / 0.01
     assert (found.zeros.size, found.period_s) == (0, 0.0)
     assert (found.poles[0].real, found.gain) == (pytest.approx(-rate), pytest.approx(0.5 / 0.2 * rate))
+
+
+@pytest.mark.parametrize(
+    ("zeros", "poles", "gain", "residues"),
+    [
+        ([], [0.5], 3.0, [3.0]),
+        ([0.25], [0.5, 0.75], 2.0, [2.0 * 0.25 / -0.25, 2.0 * 0.5 / 0.25]),
+        ([], [0.5, 0.75, 0.25], 1.0, [1.0 / (-0.25 * 0.25), 1.0 / (0.25 * 0.5), 1.0 / (-0.25 * -0.5)]),
+        ([0.5], [0.5 + 0.5j, 0.5 - 0.5j], 4.0, [4.0 * 0.5j / 1j, 4.0 * -0.5j / -1j]),
+    ],
+)
+def test_residues_stand_in_the_order_of_their_poles(zeros, poles, gain, residues):
+    of = roots_module.Roots(np.array(zeros, dtype=complex), np.array(poles, dtype=complex), gain, 0.5)
+    np.testing.assert_allclose(hold._residues(of), residues, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("factor", "worst"), [(1.0, 0.0), (1.001, 1e-3), (0.5, 0.5)])
+def test_a_model_behind_a_hold_differs_by_the_share_that_its_gain_is_off(factor, worst):
+    sampled = roots_module.Roots(np.zeros(0, complex), np.array([0.8 + 0j]), 0.5, 0.01)
+    rate = -math.log(0.8) / 0.01
+    found = roots_module.Roots(np.zeros(0, complex), np.array([-rate + 0j]), factor * 0.5 / 0.2 * rate)
+    assert hold._difference(found, sampled) == pytest.approx(worst, abs=1e-12)
+    broken = roots_module.Roots(np.zeros(0, complex), np.array([0j]), 1.0)
+    assert hold._difference(broken, sampled) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("period", "said"),
+    [(-0.5, "Ts = -0.5 s"), (math.inf, "Ts = inf s"), (math.nan, "Ts = nan s"), (-1.0, "Ts = -1 s")],
+)
+def test_a_sample_time_that_is_none_is_told(period, said):
+    with pytest.raises(ExportError) as told:
+        roots_module._period(period, "a source")
+    assert str(told.value) == (
+        f"a source: sampled, {said}, which is no time; give the sample time in s, or Ts = 0 if it is continuous"
+    )
+    assert [roots_module._period(each, "") for each in (0.0, 2e-5)] == [0.0, 2e-5]
+
+
+@pytest.mark.parametrize(
+    ("shape", "taken"), [((1, 3), True), ((3, 1), True), ((1, 1), True), ((0, 3), True), ((2, 2), False)]
+)
+def test_roots_stand_in_a_row_or_a_column(shape, taken):
+    values = np.arange(float(np.prod(shape))).reshape(shape)
+    if taken:
+        assert roots_module._row(values, "z", "a source").tolist() == values.ravel().tolist()
+        return
+    with pytest.raises(
+        ExportError, match=re.escape(f"a source: z has shape {shape}, not a row or a column; choose one")
+    ):
+        roots_module._row(values, "z", "a source")
+
+
+def test_an_object_without_a_name_is_called_python_control():
+    system = python_control.tf([1.0], [1.0, -5.0])
+    with pytest.raises(
+        ExportError, match=r"^python-control: unstable, a pole at 0.7958 Hz with a damping ratio of -1; a"
+    ):
+        import_control(system, GIVEN)
+    text = import_control(python_control.tf([2.0], [1.0, 500.0]), GIVEN)
+    assert text.splitlines()[:2] == [
+        "# Mirror imported from python-control: linear, without hysteresis or creep.",
+        'name = "Our mirror"',
+    ]
+    sampled = import_control(python_control.tf([0.5], [1.0, -0.5], 1e-4), GIVEN)
+    assert sampled.splitlines()[1] == "#   sampled there, Ts = 0.0001 s; its drive counts as held over each sample"
+
+
+@pytest.mark.parametrize(
+    ("pole", "refused"),
+    [
+        (complex(-1e-3, 1e-7), False),
+        (complex(-1e-3, 5e-10), True),
+        (complex(-0.5, 4e-7), True),
+        (complex(-0.5, 6e-7), False),
+    ],
+)
+def test_a_pole_is_on_the_negative_axis_by_the_share_of_its_size(pole, refused):
+    of = roots_module.Roots(np.zeros(0, complex), np.array([pole, pole.conjugate()]), 1.0, 0.01)
+    if not refused:
+        hold._refuse_without_inverse(of, "a source")
+        return
+    with pytest.raises(
+        ExportError, match=r"^a source: a pole on the negative real axis, \|z\| = .* at 50 Hz, turns its sign"
+    ):
+        hold._refuse_without_inverse(of, "a source")
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"s": states(C="text"), "x": 1.0}, "(folder)/model.mat, s: C is not a matrix of numbers; save numbers"),
+        (
+            {"tip": roots(k=0.0)},
+            "(folder)/model.mat, tip: a gain of 0.0; the mirror does not move: check the model",
+        ),
+        ({"tip": roots(k=np.ones((2, 1)))}, "(folder)/model.mat, tip: k has 2 gains; choose one input and one output"),
+        (
+            {"a": states(InputUnit="Hz")},
+            "(folder)/model.mat, a: its input is in Hz, and a mirror's drive is in V; choose",
+        ),
+    ],
+)
+def test_a_refusal_of_a_structure_has_its_name_behind_the_file(tmp_path, fields, told):
+    assert message(tmp_path, fields).startswith(told)
+
+
+def test_an_object_and_a_file_of_version_7_3_are_told_what_to_save(tmp_path, monkeypatch):
+    path = tmp_path / "model.mat"
+    for begin in (b"MATLAB 7.3 MAT-file", b"\x89HDF\r\n\x1a\n and more"):
+        path.write_bytes(begin)
+        with pytest.raises(ExportError) as told:
+            matlab.load(path)
+        assert str(told.value) == (
+            f"{path} is of version 7.3; save it as version 7: s = struct('A', sys.A, 'B', sys.B, 'C', sys.C, 'D', "
+            "sys.D, 'Ts', sys.Ts); save('model.mat', 's', '-v7')"
+        )
+    monkeypatch.setattr(matlab, "load", lambda of: {"tip": matlab.Unread("an object of MATLAB", "save it")})
+    with pytest.raises(ExportError) as told:
+        matlab.select(path, None)
+    assert str(told.value) == (
+        f"{path}: variable 'tip' is an object of MATLAB, which only MATLAB can read; save its matrices: "
+        "s = struct('A', tip.A, 'B', tip.B, 'C', tip.C, 'D', tip.D, 'Ts', tip.Ts)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "form"),
+    [("ABCD", "ABCD"), ("zpkABC", "zpk"), ("zpkABCD", "ABCD"), ("ABC", ""), ("zp", ""), ("", "")],
+)
+def test_the_first_form_that_is_whole_counts(names, form):
+    assert "".join(matlab.form_of(dict.fromkeys(names))) == form
+    assert matlab.form_of({"num": 1, "den": 2, "z": 3}) == ("num", "den")
+
+
+@pytest.mark.parametrize(
+    ("stated", "taken"),
+    [
+        ("V", True),
+        ("", True),
+        ("rad", False),
+        (np.array("V"), True),
+        (np.array(["m"]), False),
+        (np.array(["m", "V"]), True),
+        (3.0, True),
+    ],
+)
+def test_an_input_is_in_volts_where_its_unit_is_one_word(stated, taken):
+    fields = {"z": np.zeros((0, 1)), "p": np.array([[-2.0]]), "k": np.array([[3.0]]), "InputUnit": stated}
+    if taken:
+        found = roots_module.roots_of_fields(fields, "a source")
+        assert (found.poles.tolist(), found.gain, found.period_s) == ([-2.0], 3.0, 0.0)
+        return
+    with pytest.raises(
+        ExportError, match=r"^a source: its input is in (rad|m), and a mirror's drive is in V; choose the"
+    ):
+        roots_module.roots_of_fields(fields, "a source")

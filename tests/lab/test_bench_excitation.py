@@ -528,3 +528,144 @@ def test_a_size_beyond_three_limits_is_refused_with_what_fits_all_of_them():
         f"to -5.75 V, limits.drive_min is -3.5 V; {most}; amplitude takes the drive to {8e-3 * slew:.4g} kV/s, "
         f"limits.slew is 700 V/s; {most}"
     )
+
+
+EVEN = replace(ODD, rate_hz=640.0)
+FEWER = "; would fit: at most 15620 s (20 million samples), or a lower rate"
+TONES = Lines(625 / 622.08, 3.0, 90.0)
+MOST_RMS = "would fit: at most 592.4 mV"
+
+
+@pytest.mark.parametrize(
+    ("design", "message"),
+    [
+        (
+            lambda: tones(EVEN, lines=Lines(2e4, 10.0, 20.0), realisations=2, name="m"),
+            f"m: period makes a record of 20000 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: tones(EVEN, lines=Lines(1.0, 10.0, 20.0), periods=20_000, realisations=2),
+            f"multisine: periods makes a record of 20000 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: tones(EVEN, lines=Lines(1.0, 10.0, 20.0), periods=9000, realisations=2),
+            f"multisine: realisations makes a record of 18000 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: tones(ODD, lines=TONES, realisations=2, rms_v=3.0, offset_v=1.0, name="tone"),
+            f"tone: rms takes the drive to 11.48 V, limits.drive_max is 9.25 V; {MOST_RMS}; rms takes the drive to "
+            f"-7.341 V, limits.drive_min is -3.5 V; {MOST_RMS}; rms takes the drive to 3.544 kV/s, limits.slew is "
+            f"700 V/s; {MOST_RMS}",
+        ),
+        (
+            lambda: tones(ODD, lines=TONES, realisations=2, rms_v=0.3, offset_v=9.5),
+            "multisine: offset has 9.5 V, outside limits.drive_min to limits.drive_max; would fit: -3.5 V to 9.25 V",
+        ),
+        (
+            lambda: sines(ODD, freq_hz=51.84, amplitudes_v=[0.5, 3.0, 4.5], periods=3, offset_v=-1.25, name="s"),
+            "s: amplitudes takes the drive to -5.75 V, limits.drive_min is -3.5 V; would fit: at most 2.25 V; "
+            "amplitudes takes the drive to 1.4 kV/s, limits.slew is 700 V/s; would fit: at most 2.25 V",
+        ),
+        (
+            lambda: sines(ODD, freq_hz=207.36, amplitudes_v=[0.5], periods=3),
+            "sines: frequencies reaches 207.4 Hz, 3 samples a period at 622.1 Hz where limits.samples_per_period asks "
+            "for 4.5; would fit: at most 138.2 Hz, or a rate of at least 933.2 Hz",
+        ),
+        (
+            lambda: sines(EVEN, freq_hz=16.0, amplitudes_v=[0.5], periods=320_000),
+            f"sines: periods makes a record of 20000 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: sines(EVEN, freq_hz=16.0, amplitudes_v=[0.5, 0.75, 1.0], periods=90_000),
+            f"sines: periods makes a record of 16880 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: sines(ODD, freq_hz=51.84, axis=5, amplitudes_v=[0.5]),
+            "sines: axis is 6, but the bench has 2 inputs; would fit: 1 to 2",
+        ),
+        (
+            lambda: steps(ODD, levels_v=[-3.5, -3.6, 9.3], rise_s=0.1, name="stairs"),
+            "stairs: levels has -3.6 V, outside limits.drive_min to limits.drive_max; would fit: -3.5 V to 9.25 V",
+        ),
+        (
+            lambda: steps(ODD, levels_v=[-3.5, 9.0], rise_s=0.0),
+            "staircase: rise makes the largest step one of 7.776 kV/s, limits.slew is 700 V/s; would fit: at least "
+            "19.3 ms",
+        ),
+        (
+            lambda: steps(EVEN, levels_v=[1.0, 2.0, 3.0], rise_s=6000.0),
+            f"staircase: rise makes a record of 18000 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: steps(EVEN, levels_v=[1.0, 2.0, 3.0], rise_s=1000.0, dwell_s=5000.0),
+            f"staircase: dwell makes a record of 18000 s at 640 Hz{FEWER}",
+        ),
+        (
+            lambda: steps(ODD, levels_v=[1.0, 2.0], axis=-1),
+            "staircase: axis is 0, but the bench has 2 inputs; would fit: 1 to 2",
+        ),
+        (
+            lambda: chirp(ODD, amplitude_v=6.0, offset_v=-3.5, stop_hz=12.0),
+            "chirp: amplitude takes the drive to -9.5 V, limits.drive_min is -3.5 V; would fit: at most 0 V",
+        ),
+        (
+            lambda: chirp(replace(ODD, slew_v_s=40.0), amplitude_v=0.5, offset_v=1.0, stop_hz=138.0),
+            "chirp: amplitude takes the drive to 386.3 V/s, limits.slew is 40 V/s; would fit: at most 51.77 mV",
+        ),
+    ],
+)
+def test_a_design_beyond_its_length_size_or_slope_is_refused_in_all_words(design, message):
+    with pytest.raises(DesignError) as refused:
+        design()
+    assert str(refused.value) == message
+
+
+@pytest.mark.parametrize(
+    ("design", "name", "rest_v", "period"),
+    [
+        (chirp, "chirp", 6.0, None),
+        (lambda: sines(amplitudes_v=[1.5]), "sines", 6.0, 200),
+        (lambda: sines(amplitudes_v=[1.5], periods=1), "sines", 6.0, None),
+        (lambda: steps(levels_v=[2.5, 4.0, 3.0]), "staircase", 2.5, None),
+        (lambda: tones()[0], "multisine", 6.0, 2000),
+    ],
+)
+def test_a_design_has_its_name_its_rest_and_its_period_without_being_told(design, name, rest_v, period):
+    made = design()
+    assert (made.name, made.rest_v, made.rate_hz, made.period_samples) == (name, rest_v, 10e3, period)
+    assert made.drive.shape == (made.samples, 1)
+
+
+@pytest.mark.parametrize(
+    ("start_hz", "stop_hz", "choice", "lines"),
+    [
+        (2.0, 7.0, "all", [2, 3, 4, 5, 6, 7]),
+        (1.6, 6.9, "all", [2, 3, 4, 5, 6]),
+        (2.0, 8.0, "odd", [3, 5, 7]),
+        (0.0, 3.0, "all", [1, 2, 3]),
+        (4.0, 4.0, "all", [4]),
+        (2.9999999, 5.0000001, "odd", [3, 5]),
+    ],
+)
+def test_a_multisine_has_each_line_of_its_band_the_ends_included(start_hz, stop_hz, choice, lines):
+    (made,) = tones(lines=Lines(1.0, start_hz, stop_hz, choice))
+    assert list(made.lines) == lines
+
+
+@pytest.mark.parametrize(("odd", "kept"), [(3, 3), (4, 3), (7, 6), (8, 6), (11, 9)])
+def test_of_each_four_odd_lines_one_is_left_out_and_of_fewer_none(odd, kept):
+    (made,) = tones(lines=Lines(1.0, 5.0, 5.0 + 2 * (odd - 1), "odd-random"))
+    every = np.arange(5, 5 + 2 * odd, 2)
+    groups = [set(every[4 * k : 4 * k + 4].tolist()) for k in range(odd // 4)]
+    assert len(made.lines) == kept and set(made.lines) <= set(every.tolist())
+    assert all(len(group - set(made.lines)) == 1 for group in groups)
+
+
+def test_each_of_three_pairs_of_realisations_has_phases_of_its_own():
+    made = multisine(ODD, TONES, rms_v=0.1, offset_v=2.5, periods=1, realisations=6, seed=4)
+    phases = [np.fft.rfft(each.drive - 2.5, axis=0)[4:50] for each in made]
+    ratios = [found[:, 1] / found[:, 0] for found in phases]
+    assert [each.name for each in made] == [f"multisine-{k}" for k in range(1, 7)]
+    for a, b in ((0, 1), (2, 3), (4, 5)):
+        np.testing.assert_allclose(ratios[a], -ratios[b], atol=1e-8)
+    assert min(np.abs(ratios[a] - ratios[b]).max() for a, b in ((0, 2), (0, 4), (2, 4))) > 0.1

@@ -349,3 +349,23 @@ def test_an_amplifier_that_slews_somewhere_goes_from_sample_to_sample():
     for command in drive[:-1]:
         expected.append(expected[-1] + share * (command - expected[-1]))
     np.testing.assert_allclose(quick, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("moving", "runs"),
+    [
+        ("1", [(0, 1, True)]),
+        ("0011", [(0, 2, False), (2, 4, True)]),
+        ("10010", [(0, 1, True), (1, 3, False), (3, 4, True), (4, 5, False)]),
+        ("000", [(0, 3, False)]),
+    ],
+)
+def test_runs_of_a_record_follow_each_other_to_its_end(moving, runs):
+    assert _stretches(np.array([each == "1" for each in moving])) == runs
+
+
+@pytest.mark.parametrize("bandwidth_hz", [1.0, 159.154943, 5e3])
+def test_the_time_constant_of_an_amplifier_is_that_of_its_corner(bandwidth_hz):
+    assert Amplifier(bandwidth_hz, 7.0).time_constant_s == pytest.approx(
+        1 / (6.283185307179586 * bandwidth_hz), rel=1e-12
+    )

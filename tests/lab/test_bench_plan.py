@@ -603,3 +603,126 @@ def test_a_record_beyond_the_limits_of_a_plan_of_two_axes_stands_on_its_own_line
         "-3 V to 9 V",
     )
     assert fault.line == 1 + text[: text.index("levels =")].count("\n")
+
+
+WRONG = """
+kind = "chirp" => kind = 3 | excitation.c.kind | is none of the choices
+kind = "chirp"\\n =>  | excitation.c.kind | is missing
+axis = 2\\nuse => axis = 0\\nuse | excitation.c.axis | is below 1
+periods = 2 => periods = 2.5 | excitation.m.periods | is not a whole number
+seed = 5 => seed = -1 | excitation.m.seed | is below 0
+rms = "0.5 => rms = "0 | excitation.m.rms | is not above 0 V
+["0.5 V", "1.25 V"] => ["1.25 V", "1.25 V"] | excitation.s.amplitudes | does not rise from item to item
+use = "validation" => use = "check" | excitation.c.use | is none of the choices
+share = 0.05 => share = 11 | excitation.c.noise_share | is above 10
+crosstalk = -0.25 => crosstalk = -0.75 | bench.crosstalk | is below -0.5
+axes = 2 => axes = 5 | bench.axes | is above 4
+bits = 14 => bits = 3 | bench.converters.bits | is below 4
+bits = 14 => bits = 33 | bench.converters.bits | is above 32
+period = 4.5 => period = 2 | limits.samples_per_period | is not above 2
+"3 urad" => "-3 urad" | bench.sensor.mains | is below 0 rad
+truth = "linear" => truth = "plan" | bench.truth | is none of the choices
+["npz", "csv"] => "csv" | formats | is no list of different file formats
+["npz", "csv"] => [] | formats | is no list of different file formats
+["npz", "csv"] => ["npz", 3] | formats | is no list of different file formats
+"2.5 V" => "2.5 mrad" | excitation.m.offset | is in "mrad", another kind of quantity
+["2 V", "-1 V", "5 V"] => ["2 V"] | excitation.t.levels | has one item, which is no step
+[excitation.t] => [excitation."t t"] | excitation.t t | is no name that a file can have
+[excitation.t] => [excitation.C] | excitation | makes two records named "C"
+[excitation.t] => [excitation.M-2] | excitation | makes two records named "M-2"
+["12.4416 Hz",  => ["30 Hz",  | excitation.s.frequencies | does not rise from item to item
+"1.1 s" => "1.1 s"\\nspeed = 3 | excitation.c.speed | is no key of [excitation.c]
+lines = "all" => lines = "even" | excitation.m.lines | is none of the choices
+"0.1 s" => 0.1 | excitation.t.dwell | is a number without a unit
+"7 nrad/s" => "7 nrad" | bench.sensor.drift | is in "nrad", another kind of quantity
+"3 mrad" => "-2 mrad" | bench.converters.output_max | is not above output_min
+stop = "33 Hz" => stop = "0.7 Hz" | excitation.c.stop | is not above start
+"""
+EXPECTED = """
+excitation.c.kind | kind = "chirp" or kind = "multisine" or kind = "sines" or kind = "staircase"
+excitation.c.axis | a whole number without quotes, from 1 to 1000000; for example axis = 2
+excitation.m.periods | a whole number without quotes, from 1 to 1000000; for example periods = 2
+excitation.m.seed | a whole number without quotes, from 0 to 9223372036854775807; for example seed = 2
+excitation.m.rms | a voltage with its unit, above 0 V; for example rms = "5 V"
+excitation.s.amplitudes | a list, rising, each item a voltage with its unit, above 0 V
+excitation.c.use | use = "identification" or use = "validation"
+excitation.c.noise_share | a number without quotes, at least 0, at most 10; for example noise_share = 5.0
+bench.crosstalk | a number without quotes, at least -0.5, at most 0.5; for example crosstalk = 0.5
+bench.axes | a whole number without quotes, from 1 to 4; for example axes = 2
+bench.converters.bits | a whole number without quotes, from 4 to 32; for example bits = 4
+limits.samples_per_period | a number without quotes, above 2; for example samples_per_period = 5.0
+bench.sensor.mains | an angle with its unit, at least 0 rad, at most 1.571 rad; for example mains = "5 urad"
+bench.truth | truth = "bench" or truth = "linear" or truth = "bouc-wen"
+formats | a list with some of csv, lvm, tdms, mat, mat73, npz, hdf5; for example formats = ["csv"]
+excitation.m.offset | a voltage with its unit; for example offset = "5 V"
+excitation.t.levels | at least two levels
+excitation.t t | a table [excitation.NAME] for each, NAME of letters, digits, - and _
+excitation | names that stay different
+excitation.s.frequencies | a list, rising, each item a frequency with its unit, above 0 Hz, at most 1 THz
+excitation.c.speed | one of use, rate, truth, noise_share, kind, start, stop, duration, amplitude, offset, axis
+excitation.m.lines | lines = "all" or lines = "odd" or lines = "odd-random"
+excitation.t.dwell | a time with its unit; for example dwell = "0.1 us"
+bench.sensor.drift | an angular rate with its unit; for example drift = "5 nrad/s"
+bench.converters.output_max | above -2 mrad
+excitation.c.stop | a frequency above 700 mHz
+"""
+
+
+@pytest.mark.parametrize("line", WRONG.strip().split("\n"))
+def test_a_value_of_a_plan_that_is_none_is_told_in_all_words_on_its_line(refuse, line):
+    change, key, reason = line.split(" | ")
+    old, new = change.replace("\\n", "\n").split(" => ")
+    expected = dict(row.split(" | ") for row in EXPECTED.strip().split("\n"))[key]
+    assert TWO_AXES.count(old) == 1
+    text = TWO_AXES.replace(old, new)
+    (fault,) = refuse(text).faults
+    assert (fault.key, fault.reason, fault.expected) == (key, reason, expected)
+    changed_line = next(
+        n for n, pair in enumerate(zip(TWO_AXES.split("\n"), text.split("\n"), strict=False), 1) if len(set(pair)) > 1
+    )
+    assert fault.line == (0 if key == "excitation" else changed_line - (reason == "is missing"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "nearest"),
+    [
+        ('"chrip"', '"chirp"'),
+        ('"sine"', '"sines"'),
+        ('"stairs"', '"staircase"'),
+        ('"step"', ""),
+        ("3", ""),
+        ('"CHIRP"', ""),
+    ],
+)
+def test_a_kind_that_is_none_is_told_with_the_nearest_that_is(refuse, kind, nearest):
+    (fault,) = refuse(TWO_AXES.replace('kind = "chirp"', f"kind = {kind}")).faults
+    assert (fault.value, fault.nearest) == (kind, nearest)
+
+
+def test_what_an_excitation_says_of_its_own_goes_to_its_design(tmp_path):
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_AXES, encoding="utf-8")
+    found = load_plan(path)
+    limits = dict(found.limits)
+    assert limits == {
+        "rate_hz": 622.08,
+        "drive_min_v": -3.0,
+        "drive_max_v": 9.0,
+        "slew_v_s": 700.0,
+        "samples_per_period": 4.5,
+    }
+    converters, sensor, amplifier = found.bench.converters, found.bench.sensor, found.bench.amplifier
+    assert (converters.bits, converters.drive_min_v, converters.drive_max_v) == (14, -3.5, 9.5)
+    assert (converters.output_min_rad, converters.output_max_rad) == pytest.approx((-2e-3, 3e-3))
+    assert (sensor.noise_rad, sensor.noise_share, sensor.mains_frequency_hz) == (None, 0.02, 60.0)
+    assert (sensor.mains_rad, sensor.drift_rad_s) == pytest.approx((3e-6, 7e-9))
+    assert (amplifier.gain, amplifier.output_min_v, amplifier.output_max_v) == (12.5, -50.0, 125.0)
+    assert (amplifier.bandwidth_hz, amplifier.slew_v_s) == pytest.approx((4e3, 0.5e6))
+    assert (found.bench.truth, found.bench.axes, found.bench.crosstalk) == ("linear", 2, -0.25)
+    kept = plan.select_records(found, ["t", "c"])
+    assert [record.excitation.name for record in kept.records] == ["c", "t"] and kept.sha256 == found.sha256
+    with pytest.raises(ValueError) as refused:
+        plan.select_records(found, ["c", "m", "x"])
+    assert (
+        str(refused.value) == f"{path}: no record is named 'm'; the plan has c, m-1, m-2, s-12.4416hz, s-24.8832hz, t."
+    )

@@ -20,8 +20,8 @@ from microrad.lab.bench import folder as bench_folder
 from microrad.lab.bench import load_plan, play, select_records, write_folder
 from microrad.lab.bench.mirrors import bouc_wen_output, linear_output
 from microrad.lab.bench.plan import FORMATS, PlanError
-from microrad.lab.bench.play import BenchError, _check_range, true_output
-from microrad.lab.recording import read_recording
+from microrad.lab.bench.play import BenchError, Converter, _check_range, true_output
+from microrad.lab.recording import Recording, read_recording
 
 SEED = 5
 
@@ -584,3 +584,37 @@ def test_a_mirror_that_moves_beyond_its_converter_is_told_with_both_ranges(two_a
     with pytest.raises(BenchError) as refused:
         play(two_axes, -2)
     assert str(refused.value) == "the seed is -2; give a whole number of at least 0"
+
+
+@pytest.mark.parametrize(
+    ("value", "code"),
+    [(-9.0, 0), (-2.0, 0), (-1.88, 0), (-1.87, 1), (-1.75, 1), (0.0, 8), (1.63, 15), (1.75, 15), (2.0, 15), (9.0, 15)],
+)
+def test_a_converter_gives_its_nearest_code_and_holds_the_first_and_the_last(value, code):
+    assert Converter(-2.0, 0.25, 16).convert(np.array([value, 0.1])).tolist() == [-2.0 + 0.25 * code, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "second"),
+    [
+        (0.5, "2.0000"),
+        (1.0, "1.0000"),
+        (1.5, "0.66667"),
+        (10.0, "0.10000"),
+        (622.08, "0.0016075"),
+        (50e3, "0.000020000"),
+    ],
+)
+def test_the_times_of_a_text_have_four_digits_below_the_step(rate_hz, second):
+    values = np.array([[1.0, -2.0], [0.123456789012, 1e-7]])
+    made = Recording("r", "", values, 3.0 * values[:, :1], rate_hz, ("u", "v"), ("y",), None, ("V", "mV"), ("mrad",))
+    first, row = "".join(bench_folder._rows(made, ";")).splitlines()
+    assert first.split(";")[1:] == ["1", "-2", "3"] and float(first.split(";")[0]) == 0.0
+    assert row == f"{second};0.123456789;1e-07;0.370370367"
+    assert [(name, unit, v.tolist()) for name, unit, v in bench_folder._channels(made)] == [
+        ("u", "V", [1.0, 0.123456789012]),
+        ("v", "mV", [-2.0, 1e-7]),
+        ("y", "mrad", [3.0, 3 * 0.123456789012]),
+    ]
+    assert bench_folder._facts(made) == {"rate_hz": rate_hz}
+    assert bench_folder._facts(replace(made, period_samples=2)) == {"rate_hz": rate_hz, "period_samples": 2}

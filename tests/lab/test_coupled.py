@@ -1270,3 +1270,113 @@ def test_a_result_has_what_each_amplitude_shows_and_what_the_chosen_model_makes_
     assert found.refused == (ladder.Refused("other", "why"),) and found.bands_hz is one.bands_hz
     np.testing.assert_allclose(found.output_rms[[0, 2]], [r.output.std(axis=0) for r in held])
     assert np.isnan(found.output_rms[1]).all() and np.isnan(found.noise_rms).all()
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "told"),
+    [
+        ((400, 100), (400, 200), "400 samples in periods of 200, where a has 400 samples in periods of 100"),
+        ((400, 100), (300, 100), "300 samples in periods of 100, where a has 400 samples in periods of 100"),
+        ((400, None), (399, None), "399 samples, where a has 400 samples"),
+        ((400, 100), (400, None), None),
+        ((400, None), (400, 100), None),
+    ],
+)
+def test_records_of_other_lengths_and_kinds_are_told_by_both_their_names(first, second, told):
+    one, other = (drawn_at_random(n, s, period=p) for n, (s, p) in (("a", first), ("b", second)))
+    with pytest.raises(IdentificationError) as caught:
+        channels_module._periodic([one, replace(one, path="same"), other])
+    assert str(caught.value) == (
+        f"b: {told}; cut all records to one length and period."
+        if told
+        else "b: of this record and a one is periodic and the other is not; fit records of one kind, and give the "
+        "others for validation."
+    )
+
+
+@pytest.mark.parametrize(
+    ("records", "inputs", "period", "told"),
+    [
+        (3, 3, 32, "3 records for 3 actuators: 1 held out to judge the models by leave 2, and at least 3 realisations"),
+        (2, 2, 16, "2 records for 2 actuators: 1 held out to judge the models by leave 1, and at least 2 realisations"),
+        (3, 3, None, ""),
+        (4, 3, 32, ""),
+        (1, 1, 32, "1 records, no two of one amplitude with the same channels driven: none can be held out to judge"),
+    ],
+)
+def test_what_is_held_out_leaves_as_many_realisations_as_actuators(records, inputs, period, told):
+    given = [drawn_at_random(f"r{k}", 64, inputs, seed=k, period=period) for k in range(records)]
+    if told:
+        with pytest.raises(IdentificationError) as caught:
+            channels_module._held_out(given, np.zeros(records, dtype=int))
+        assert str(caught.value).startswith(told)
+        assert str(caught.value).endswith(", or give recordings for validation.")
+    else:
+        assert channels_module._held_out(given, np.zeros(records, dtype=int)).tolist() == [records - 1]
+
+
+@pytest.mark.parametrize(
+    ("line", "band"), [(1, None), (2, 0), (3, 0), (4, 1), (9, 1), (10, 2), (16, 2), (17, None), (0, None)]
+)
+def test_a_line_of_an_error_belongs_to_the_band_that_begins_at_it_or_to_the_last(line, band):
+    """64 samples at 128 Hz: the bands are 4, 8, 20 and 32 Hz, of lines 2, 4, 10 and 16."""
+    turn = 2 * np.pi * line * np.arange(64) / 64
+    error = np.column_stack([3.0 * np.cos(turn), 5.0 * np.sin(turn + 0.4), np.zeros(64)])
+    found = held_out_module._band_power(error, 128.0, np.array([4.0, 8.0, 20.0, 32.0]))
+    expected = np.zeros((3, 3))
+    if band is not None:
+        expected[band, :2] = 4.5, 12.5
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_each_output_is_fitted_from_the_drive_that_makes_most_of_it():
+    """The first output follows the second drive by a pair of poles, and the other way round."""
+    poles = (np.array([-20.0 + 200j]), np.array([-35.0 + 420j]))
+    gain = np.zeros((80, 2, 2), dtype=complex)
+    freq = np.arange(1.0, 81.0)
+    for (o, i), pole in zip(((0, 1), (1, 0)), poles, strict=True):
+        one = ModalModel(pole, np.array([[2.0 + 0j]]), np.array([[30.0 - 5j]]), np.zeros((1, 1)))
+        gain[:, o, i] = one.response(freq, "first-order", 2000.0)[:, 0, 0]
+    fitted = linear.per_axis(table_of(gain, (1.0, 3.0)), 2, 0.0, None)
+    assert (fitted.name, fitted.kind, fitted.order, fitted.parameters) == ("per axis, order 2 each", "per axis", 4, 11)
+    np.testing.assert_allclose(fitted.poles_rad_s, np.concatenate(poles), rtol=1e-6)
+    plant = fitted.mirror
+    assert (plant.B[:2, 0].any(), plant.B[2:, 1].any()) == (False, False)
+    assert (plant.C[0, 2:].any(), plant.C[1, :2].any()) == (False, False)
+    np.testing.assert_allclose(plant.D, 0.0, atol=1e-6)
+    seen = np.array([plant.C @ np.linalg.solve(2j * np.pi * f * np.eye(4) - plant.A, plant.B) for f in (3.0, 60.0)])
+    exact = [
+        [[0.0, m.response(np.array([f]))[0, 0, 0]], [n.response(np.array([f]))[0, 0, 0], 0.0]]
+        for m, n in [
+            tuple(ModalModel(p, np.array([[2.0 + 0j]]), np.array([[30.0 - 5j]]), np.zeros((1, 1))) for p in poles)
+        ]
+        for f in (3.0, 60.0)
+    ]
+    np.testing.assert_allclose(seen, exact, rtol=1e-5, atol=1e-9)
+    assert np.isnan(fitted.delay_error_s) and fitted.delay_s == 0.0 and fitted.modes is None and fitted.note == ""
+    assert {name for name in fitted.known.parameters if ".B." in name} <= {
+        *("matrices.B.1.2", "matrices.B.2.2", "matrices.B.3.1", "matrices.B.4.1")
+    }
+
+
+@pytest.mark.parametrize(
+    ("positions", "told"),
+    [
+        ([(1.0, 2.0)], "1 positions for 2 outputs (x, y); give one for each."),
+        ([(1.0, 2.0)] * 3, "3 positions for 2 outputs (x, y); give one for each."),
+        ([], "0 positions for 2 outputs (x, y); give one for each."),
+        (None, None),
+        ([(1, -2), (0.5, 4)], [(1.0, -2.0), (0.5, 4.0)]),
+    ],
+)
+@pytest.mark.parametrize("quantity", ["displacement", "angle"])
+def test_outputs_have_as_many_positions_or_none(positions, told, quantity):
+    record = drawn_at_random("r")
+    if isinstance(told, str):
+        with pytest.raises(IdentificationError) as caught:
+            channels_module._outputs(record, quantity, positions)
+        assert str(caught.value) == told
+    else:
+        found = channels_module._outputs(record, quantity, positions)
+        expected = told or [None, None]
+        assert found == tuple(Output(name, quantity, place) for name, place in zip("xy", expected, strict=True))

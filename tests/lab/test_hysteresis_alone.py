@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import IdentificationError, Units, fit_hysteresis, measure_frequency_response
-from microrad.lab.identify.hysteresis import alone
+from microrad.lab.identify.hysteresis import alone, bouc_wen, prandtl_ishlinskii
 from microrad.lab.identify.hysteresis.alone import STATIC_FORMS
+from microrad.lab.identify.records import SiRecord
 from microrad.lab.recording import recording_from_arrays
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 
@@ -189,3 +191,162 @@ def test_a_response_begins_at_rest_at_the_bias_and_has_creep_in_it():
     moved = DRIVE - 30.0
     assert_allclose(fit.response(DRIVE, 1 / RATE), PLAYS.response(moved, 1 / RATE) + creep.response(moved, 1 / RATE))
     assert fit.admissible is PLAYS.admissible
+
+
+# ------------------------------------------------------------------------------------------ numbers of Eq. 3 by hand
+EQ3 = np.array([7e-5, 2e-4, -2e-5, 3e-3, 1.5, 0.4])
+PARTS = (
+    "loops fix the settled hysteresis |epsilon| / (alpha + sign(epsilon) beta), and only the few samples behind each "
+    "reversal separate its parts{}; record small loops with many reversals"
+)
+LARGE = (
+    "a large hysteresis that settles soon after each reversal looks like part of the linear slope; larger loops tell "
+    "them apart"
+)
+ONE_RATE = "the recordings hold loops of one rate only; record the same loop at two more frequencies"
+
+
+def problem_of(share=np.inf, falls=False):
+    """Two records of unlike steps that Eq. 3 makes, each with its offset."""
+    time = 1e-3 * np.arange(400)
+    drives = (
+        3.0 + np.sin(10 * np.pi * time) * np.linspace(0.5, 2.0, 400),
+        1.5 * np.sin(0.036 * np.pi * np.arange(300)),
+    )
+    records = [
+        SiRecord(name, "", drive, 1e-6 * drive, step_s, drive.size // 20)
+        for name, drive, step_s in zip("ab", drives, (1e-3, 2e-3), strict=True)
+    ]
+    row = np.array([*EQ3, bouc_wen.BoucWenProblem(tuple(records), share).rate_limit, 0.0])
+    made = [(-1.0 if falls else 1.0) * bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0] + 1e-4 for r in records]
+    given = tuple(replace(r, output_rad=output) for r, output in zip(records, made, strict=True))
+    return bouc_wen.BoucWenProblem(given, share)
+
+
+@pytest.mark.parametrize(
+    ("name", "one_rate", "at_bound", "reason"),
+    [
+        ("d1", True, True, LARGE),
+        ("d2", True, False, ONE_RATE),
+        ("d2", False, True, "its effect on the output is below the noise; faster loops would show it"),
+        ("delta", True, True, ONE_RATE),
+        ("delta", False, False, "the loops widen too little with rate to tell; record faster loops"),
+        ("epsilon", True, False, PARTS.format("")),
+        ("alpha", False, True, PARTS.format(" (on the bound of the admissible slope)")),
+        ("beta", True, True, PARTS.format(" (on the bound of the admissible slope)")),
+    ],
+)
+def test_why_a_number_of_eq_3_is_not_known_is_told_by_its_name_the_rates_and_the_bound(
+    name, one_rate, at_bound, reason
+):
+    relative = {each: 0.6 if each == name else 0.01 for each in bouc_wen.PARAMETERS}
+    covariance = np.diag((EQ3 * list(relative.values())) ** 2)
+    assert bouc_wen._not_identified(EQ3, covariance, one_rate, at_bound) == (
+        (name, f"relative standard error 60 %: {reason}"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("pair", "between", "told"),
+    [
+        ((0, 2), 0.96, ["d1: correlation 0.960 with epsilon", "epsilon: correlation 0.960 with d1"]),
+        ((3, 5), -0.9876, ["delta: correlation 0.988 with beta", "beta: correlation 0.988 with delta"]),
+        ((1, 4), 0.949, []),
+        ((1, 4), 0.951, ["d2: correlation 0.951 with alpha", "alpha: correlation 0.951 with d2"]),
+    ],
+)
+def test_two_numbers_of_eq_3_that_go_together_are_told_of_one_another(pair, between, told):
+    errors = np.abs(EQ3) * 0.1
+    covariance = np.diag(errors**2)
+    covariance[pair] = covariance[pair[::-1]] = between * errors[pair[0]] * errors[pair[1]]
+    found = bouc_wen._not_identified(EQ3, covariance, False, False)
+    assert [f"{name}: {reason.split(': ')[0]}" for name, reason in found] == told
+
+
+@pytest.mark.parametrize(
+    ("signs", "lowest", "settled", "gradient"),
+    [
+        ((1, 1, 1), 1.0420747e-05, 1.1, "1.1131725e4 0 3.8961039e4 0 0.18890201 -0.70838253"),
+        ((-1, -1, -1), 1.0420747e-05, 1.1, "-1.1131725e4 0 -3.8961039e4 0 0.18890201 0.70838253"),
+        ((1, 1, -1), 3.5748988e-05, 1.9, "6.4446831e3 0 2.2556391e4 0 -0.063316185 -0.23743569"),
+    ],
+    ids=["rising", "falling", "beta below 0"],
+)
+def test_slope_decay_and_bound_of_eq_3_in_numbers_whichever_way_it_runs(signs, lowest, settled, gradient):
+    d1, epsilon, beta = signs
+    values = EQ3 * [d1, 1, epsilon, 1, 1, beta]
+    assert bouc_wen.lowest_slope(problem_of(1.0), values) == pytest.approx(lowest, rel=1e-6)
+    assert bouc_wen.k_settled(values) == pytest.approx(settled, rel=1e-12)
+    assert bouc_wen._bound_gradient(values) == pytest.approx([float(v) for v in gradient.split()], rel=1e-6, abs=1e-9)
+    assert bouc_wen.made_rising(BoucWen(*values)).d1_rad_v == 7e-5
+
+
+@pytest.mark.parametrize("falls", [False, True])
+def test_searched_numbers_of_two_records_give_back_the_six_they_were_made_of(falls):
+    """The decays are alpha less beta and alpha with it, as epsilon is below 0, both in the range of the drives."""
+    problem = problem_of(falls=falls)
+    span, limit = max(np.ptp(r.drive_v) for r in problem.records), problem.rate_limit
+    assert (problem.drive_span_v, limit) == (pytest.approx(span), pytest.approx(84.770305, rel=1e-6))
+    theta = np.array([2e-4 * limit, 3e-3 * limit, np.log(1.1 * span), np.log(1.9 * span)])
+    assert problem.physical(theta) == pytest.approx((2e-4, 3e-3, 1.1, 1.9))
+    sign = -1.0 if falls else 1.0
+    assert_allclose(problem.solve(theta), EQ3 * [sign, 1, sign, 1, 1, sign], rtol=1e-6)
+    assert np.linalg.norm(problem.residual(theta)) < 1e-9
+    assert problem_of(0.5).bound(theta) == pytest.approx(0.5 * 1.1 / 3.0)
+    off = problem.residual([*theta, 0.0, 0.0, 0.1, 0.0])
+    modelled = problem.columns([*theta, 0.0, 0.0, 0.1, 0.0])
+    left = problem.target - modelled @ np.linalg.lstsq(modelled, problem.target, rcond=None)[0]
+    assert_allclose(off, left / (problem.output_span_rad * np.sqrt(665)), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ([0.0, 2.0, 1.0], "[0.0, 2.0, 1.0]"),
+        ([0.0, 1.0, 1.0], "[0.0, 1.0, 1.0]"),
+        ([0.5, 1.0], "[0.5, 1.0]"),
+        ([0.0, np.inf], "[0.0, inf]"),
+        ([], "[]"),
+        ([[0.0, 1.0]], "[[0.0, 1.0]]"),
+        ([0.0, 2.5], "[0.0, 2.5]"),
+        (-1.0, "[-1.0]"),
+    ],
+)
+def test_thresholds_of_plays_are_refused_with_half_of_the_largest_drive(given, words):
+    small = SiRecord("a", "", np.array([0.0, 1.0, 0.0]), np.zeros(3), 1.0, 0)
+    with pytest.raises(IdentificationError) as refused:
+        prandtl_ishlinskii._thresholds((small, replace(small, drive_v=np.array([1.0, 6.0, 1.0]))), given, 9)
+    assert str(refused.value) == (
+        f"the thresholds {words} V cannot be used; they must start at 0, increase strictly and stay below half of the "
+        "drive's peak-to-peak, 2.5 V, or an operator never moves both ways."
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "operators", "expected"),
+    [
+        (None, 1, [0.0]),
+        (None, 3, [0.0, 1.175, 2.35]),
+        (0.0, 9, [0.0]),
+        ([0, 2.4999], 9, [0.0, 2.4999]),
+        ((0.0, 0.5, 1.5), 2, [0.0, 0.5, 1.5]),
+    ],
+)
+def test_thresholds_of_plays_are_those_given_or_spread_evenly(given, operators, expected):
+    record = SiRecord("a", "", np.array([1.0, 6.0, 1.0]), np.zeros(3), 1.0, 0)
+    assert prandtl_ishlinskii._thresholds((record,), given, operators).tolist() == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("weights", "count"), [([3e-5, 0.0, 2e-5], 2), ([0.0, 0.0, 1e-5], 1), ([0.0] * 3, 0)])
+def test_a_fit_of_plays_answers_from_its_first_drive_value_by_the_weights_in_use(sign, weights, count):
+    fit = prandtl_ishlinskii.PrandtlIshlinskiiFit(
+        np.array([0.0, 0.5, 1.0]), np.array(weights), np.zeros(3), sign, (0.0,), 40.0, Units(), 1.0, 1.0, 0.1, 99
+    )
+    drive = np.array([2.0, 3.5, 1.0, 4.0])  # the play of 1 V stands at 2, 2.5, 2, 3; that of 0 follows
+    expected = sign * (weights[0] * drive + weights[2] * np.array([2.0, 2.5, 2.0, 3.0]))
+    found, clamped = fit.response(drive, 0.1)
+    assert_allclose(found, expected, atol=1e-18)
+    assert (clamped, fit.parameter_count, fit.falling, fit.name) == (0, count, sign < 0, "prandtl_ishlinskii")
+    assert fit.model == PrandtlIshlinskii((0.0, 0.5, 1.0), tuple(sign * w for w in weights), rate_limit_v_s=40.0)
+    assert fit.admissible is True and fit.not_identified == ()

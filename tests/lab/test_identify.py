@@ -18,13 +18,16 @@ from scipy.signal import lfilter
 
 from microrad.core.kernels import bouc_wen_response, play_response
 from microrad.lab.identify import (
+    FORMS,
     STATIC,
     BoucWenFit,
     IdentificationError,
+    JointFit,
     Units,
     fit_bouc_wen,
     fit_prandtl_ishlinskii,
     identify,
+    mirror_file,
     mirror_file_text,
     predict,
     statistics,
@@ -32,8 +35,10 @@ from microrad.lab.identify import (
 from microrad.lab.identify.hysteresis import bouc_wen as bouc_wen_of
 from microrad.lab.identify.hysteresis import prandtl_ishlinskii as prandtl_of
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, _bound_gradient, _not_identified
+from microrad.lab.identify.hysteresis.plant_fit import PlantFit
 from microrad.lab.identify.hysteresis.plant_fit import _not_identified as _not_identified_jointly
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, one_axis
 from microrad.lab.identify.mirror_file import _names
 from microrad.lab.identify.records import (
     SiRecord,
@@ -50,7 +55,7 @@ from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.selection.warnings import _FLIPPED
 from microrad.lab.identify.statistics import colour_inflation, may_be_chance
 from microrad.lab.recording import read_recording, recording_from_arrays
-from microrad.mirror.hysteresis import BoucWen
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 from microrad.mission.file import load_mirror
 from places import DATA, ROOT
 
@@ -1351,3 +1356,295 @@ def test_two_records_of_plays_have_offsets_of_their_own_and_count_by_their_sampl
     errors = np.sqrt(variance * np.diag(np.linalg.pinv(matrix.T @ matrix))[:2])
     assert_allclose(fit.standard_errors_rad_per_v, errors, rtol=1e-3)
     assert (fit.samples_used, fit.sign) == (3800 + 2375, 1)
+
+
+# ------------------------------------------------------------------------------------------ a joint fit, line by line
+ERRORS = 0.04, 0.07, 0.02, 0.05, 0.03, 0.06, 0.025, 0.015, 0.045, 0.035, 0.055, 0.065, 0.08
+
+
+def joint_identification(name, model, values, errors, *, linear=None, creep=NO_CREEP, free_linear=True, band=None):
+    """An identification by a joint fit of such values, each with a relative error of its own, neighbours correlated."""
+    structure = one_axis("m", model, linear=linear, creep=creep, free=FORMS[name].free, free_linear=free_linear)
+    values = np.array(values)
+    size = np.abs(values) * np.array(errors)
+    between = np.eye(values.size) + 0.25 * (np.eye(values.size, k=1) + np.eye(values.size, k=-1))
+    axis = structure.parts(values)
+    fit = object.__new__(JointFit)
+    plant_fit = object.__new__(PlantFit)
+    known = {"covariance": size[:, None] * between * size, "not_identified": (("widening", "of a reason"),)}
+    vars(plant_fit).update({"values": values, "converged": True, "evaluations": 9} | known)
+    given = {"name": name, "form": FORMS[name], "structure": structure, "fit": plant_fit, "hold": "first-order"}
+    given |= {"model": axis.model, "creep": axis.creep, "linear": axis.linear, "units": Units(), "samples_used": 1234}
+    for key, value in ({"rate_limit_v_per_s": 56.78} | given).items():
+        object.__setattr__(fit, key, value)
+    return static_identification(fit, linear=band)
+
+
+def tables_of(identification):
+    """The tables of a mirror file as lines, with the names of its sources abridged, and its correlations."""
+    text = mirror_file_text(identification, "joint").replace("from a.csv, b.csv", "from loops")
+    lines = [re.sub(" +# identified: ", " | ", line) for line in text.split("\n")[:-1]]
+    at = lines.index("correlation = [")
+    rows = [[float(v) for v in line.strip(" ,").split(", ")] for line in lines[at + 1 : -1]]
+    return lines, lines[lines.index("") + 1 : at], rows
+
+
+JOINT_LINEAR = LinearPoles(Roots((40.0, 150.0), (1.0, 0.3)), Roots((60.0,), (1.0,)), 3.0, 2e-4, 1e-4)
+OF_LINEAR = [41.0, 151.0, 0.31, 61.0, 3e-4]
+EXCITED = SimpleNamespace(excited_hz=(2.5, 333.0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_mirror_file_of_joint_plays_is_line_by_line_what_was_found(sign):
+    model = PrandtlIshlinskii((0.0, 0.5, 2.0), (6e-5 * sign, 0.0, 2e-5 * sign), 2e-3, 56.78)
+    values = [*(sign * np.array([6.25e-5, 1e-18, 2.5e-5])), 3e-3, sign * 5e-7, sign * 2.5e-7, *OF_LINEAR]
+    creep = Creep((3e-7 * sign, 3e-7 * sign), (0.01, 1.0))
+    given = "prandtl_ishlinskii_rate_creep", model, values, ERRORS[: len(values)]
+    lines, tables, rows = tables_of(joint_identification(*given, linear=JOINT_LINEAR, creep=creep, band=EXCITED))
+    flipped = [f"# Warning: {_FLIPPED}"] if sign < 0.0 else []
+    assert lines[9] == "# 1234 samples used, behind the initial transient of each recording."
+    assert lines[16 : 22 + len(flipped)] == [
+        *flipped,
+        "# Not identified: widening, of a reason; the loops widen too little with the rate to tell; record faster "
+        "loops",
+        "# Not identified: creep that is slower, no record lasts long enough for a lag beyond 1 s; over a short record "
+        "creep looks like gain; record a staircase with long dwells",
+        'name = "joint"',
+        'travel = "1.235 mrad" | fitted range, from loops',
+        'composition = "cascade" | hysteresis drives the linear part below; both were fitted together',
+        'rate_limit = "56.78 V/s" | fastest rate of the drive, from loops',
+    ]
+    assert tables == [
+        "[prandtl_ishlinskii]",
+        'thresholds = ["0.0 V", "0.5 V", "2.0 V"] | chosen, not fitted; from loops',
+        'weights = ["0.0625 mrad/V", "0.0 mrad/V", "0.025 mrad/V"] | ± standard error 0.0025, 7e-17, 0.0005 mrad/V, '
+        "from loops",
+        'widening = "0.003 s" | ± standard error 0.00015 s, from loops',
+        "",
+        "[creep]",
+        'time_constants = ["0.01 s", "1.0 s"] | decades that the recordings cover; from loops',
+        'weights = ["0.0005 mrad/V", "0.00025 mrad/V"] | ± standard error 1.5e-05, 1.5e-05 mrad/V, from loops',
+        "",
+        "[linear]",
+        'poles = ["41.0 Hz", "151.0 Hz"] | ± standard error 1, 2.3 Hz, from w.csv',
+        "pole_dampings = [1.0, 0.31] | 1 is a real pole; from w.csv",
+        'zeros = ["61.0 Hz"] | ± standard error 2.1 Hz, from w.csv',
+        "zero_dampings = [1.0] | 1 is a real zero; from w.csv",
+        "# recording: drive straight between samples, output 0.0003 ± 1.6e-05 s late, a delay that belongs to the "
+        "recording chain and is no part of the mirror",
+        'normalise_at = "3.0 Hz" | where the linear part has the magnitude 1',
+        'excited_from = "2.5 Hz" | lowest frequency with a drive in it, from w.csv',
+        'excited_to = "333.0 Hz" | highest frequency with a drive in it, from w.csv',
+        "",
+        "[uncertainty]",
+        'parameters = ["prandtl_ishlinskii.weights.1", "prandtl_ishlinskii.weights.3", "prandtl_ishlinskii.widening", '
+        '"creep.weights.1", "creep.weights.2", "linear.poles.1", "linear.poles.2", "linear.pole_dampings.2", '
+        '"linear.zeros.1"] | those not held or at a bound',
+        "standard_errors = [0.04, 0.02, 0.05, 0.03, 0.06, 0.025, 0.015, 0.045, 0.035] | relative to the values, at "
+        "most 1 in any combination, from loops",
+    ]
+    near = [0.0, 0.25 * sign, 0.25 * sign, 0.25, 0.25 * sign, 0.25, 0.25, 0.25]
+    for k, (row, last) in enumerate(zip(rows, near, strict=True)):
+        assert row == pytest.approx([*[0.0] * k, last], abs=1e-6)
+
+
+EQ_3_FREE = [
+    *('d1 = "0.08 mrad/V" | ± standard error 0.0032 mrad/V', 'd2 = "2e-05 s/V" | ± standard error 6e-07 s/V'),
+    *(
+        'epsilon = "-0.03125 mrad/V" | ± standard error 0.0022 mrad/V',
+        'delta = "0.005 s/V" | ± standard error 0.0003 s/V',
+    ),
+    *('alpha = "1.5 1/V" | ± standard error 0.03 1/V', 'beta = "0.375 1/V" | ± standard error 0.022 1/V'),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "model", "values", "linear", "written", "errors"),
+    [
+        (
+            "bouc_wen_asymmetric",
+            BoucWen(8e-5, 1e-5, -3e-5, 4e-3, 1.4, 0.4, 100.0),
+            [8e-5, -3.125e-5, 1.5, 0.25, 2e-5, 5e-3, 0.25, -0.125],
+            None,
+            [
+                *EQ_3_FREE,
+                'gamma = "0.375 1/V" | ± standard error 0.012 1/V',
+                'eta = "-0.1875 1/V" | ± standard error 0.0047 1/V',
+            ],
+            [0.04, 0.03, 0.07, 0.06, 0.02, 0.0583, 0.032, 0.025],
+        ),
+        (
+            "bouc_wen_classical",
+            BoucWen(8e-5, 0.0, -3e-5, 0.0, 1.4, 0.4, 100.0, exponent=1.5),
+            [8e-5, -3.125e-5, 1.5, 0.25, 2.0],
+            None,
+            [
+                *(EQ_3_FREE[0], 'd2 = "0.0 s/V" | held, not fitted', EQ_3_FREE[2]),
+                *('delta = "0.0 s/V" | held, not fitted', *EQ_3_FREE[4:]),
+                "exponent = 2.0 | ± standard error 0.06",
+            ],
+            [0.04, 0.07, 0.02, 0.0583, 0.03],
+        ),
+        (
+            "bouc_wen_joint",
+            BoucWen(8e-5, 1e-5, -3e-5, 4e-3, 1.4, 0.4, 100.0),
+            [8e-5, -3.125e-5, 1.5, 0.25, 2e-5, 5e-3],
+            JOINT_LINEAR,
+            EQ_3_FREE,
+            [0.04, 0.03, 0.07, 0.06, 0.02, 0.0583],
+        ),
+    ],
+)
+def test_a_mirror_file_of_a_joint_eq_3_has_what_is_free_and_what_is_held(name, model, values, linear, written, errors):
+    given = name, model, values, ERRORS[: len(values)]
+    made = joint_identification(*given, linear=linear, free_linear=False, band=EXCITED if linear else None)
+    lines, tables, _ = tables_of(made)
+    assert tables[: 1 + len(written)] == [
+        "[bouc_wen]",
+        *(f"{line}, from loops" for line in written),
+    ]
+    rest = tables[1 + len(written) :]
+    assert rest[-1].startswith(f"standard_errors = [{', '.join(f'{e:g}' for e in errors)}] | relative to the values")
+    composition = next(line for line in lines if line.startswith("composition"))
+    if linear is None:
+        assert composition == 'composition = "static" | the linear dynamics of the mirror were not identified'
+        assert rest[:2] == ["", "[uncertainty]"]
+        return
+    assert composition == 'composition = "cascade" | hysteresis drives the linear part below; both were fitted together'
+    held = "from the frequency response, held in the joint fit, from w.csv"
+    assert rest[1:7] == [
+        *(
+            "[linear]",
+            f'poles = ["40.0 Hz", "150.0 Hz"] | {held}',
+            "pole_dampings = [1.0, 0.3] | 1 is a real pole; from w.csv",
+        ),
+        *(f'zeros = ["60.0 Hz"] | {held}', "zero_dampings = [1.0] | 1 is a real zero; from w.csv"),
+        "# recording: drive straight between samples, output 0.0002 s late, a delay that belongs to the recording "
+        "chain and is no part of the mirror",
+    ]
+
+
+def test_a_static_model_beside_a_linear_part_does_not_use_it_and_a_search_that_stopped_is_told():
+    model = PrandtlIshlinskii((0.0, 1.0), (6e-5, 2e-5))
+    made = joint_identification("prandtl_ishlinskii_creep", model, [5e-5, 2.5e-5], ERRORS[:2], band=EXCITED)
+    vars(made.fits[0].fit).update(converged=False, evaluations=77)
+    lines, tables, rows = tables_of(made)
+    assert 'composition = "static" | the linear dynamics of the mirror are not used by this model' in lines
+    assert lines[14:17] == [
+        *("# Warning: one.", "# Warning: two."),
+        "# Warning: The search for the parameters stopped after 77 evaluations, before it had settled: the model is "
+        "what the scores say, but its standard errors are those of a point that is no minimum.",
+    ]
+    assert tables[2] == 'weights = ["0.05 mrad/V", "0.025 mrad/V"] | ± standard error 0.002, 0.0018 mrad/V, from loops'
+    assert rows == [[pytest.approx(0.25, abs=1e-5)]]
+    vars(made)["sources"] = tuple(choice.RecordingUse(f"in/{n}.csv", n, 9, 9) for n in "klmn")
+    assert 'drive_min = "-1.5 V" | lowest drive, from k.csv and 3 more' in tables_of(made)[0]
+    with pytest.raises(IdentificationError) as refused:
+        mirror_file_text(made, " \t")
+    assert str(refused.value) == ("the mirror has no name; give one, it stands in the mirror file and in the report.")
+
+
+def test_the_error_of_an_idle_play_goes_to_its_nearest_neighbour_at_work():
+    key = "prandtl_ishlinskii.weights."
+    sizes = {
+        f"{key}1": 0.0,
+        f"{key}2": 5.0,
+        f"{key}3": 0.001,
+        f"{key}4": 0.002,
+        f"{key}5": 3.0,
+        f"{key}6": 0.0,
+        "creep": 0.0,
+    }
+    expected = np.diag([0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
+    expected[1, 0] = expected[1, 2] = expected[4, 3] = expected[4, 5] = 1.0
+    np.testing.assert_array_equal(mirror_file._with_neighbours(sizes), expected)
+    sizes[f"{key}3"] = 0.0081  # more than a thousandth of the sum
+    assert mirror_file._with_neighbours(sizes)[2].tolist() == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+    np.testing.assert_array_equal(
+        mirror_file._with_neighbours({f"{key}1": 0.0, f"{key}2": 0.0}), [[0.0, 0.0], [0.0, 0.0]]
+    )
+
+
+def test_what_is_held_leaves_to_the_others_what_they_do_not_share_with_it():
+    covariance = np.array([[4.0, 1.0, 2.0], [1.0, 9.0, -3.0], [2.0, -3.0, 16.0]])
+    found = mirror_file._holding(covariance, np.array([False, False, True]))
+    apart = covariance[:2, :2] - np.outer(covariance[:2, 2], covariance[:2, 2]) / 16.0
+    np.testing.assert_allclose(found[:2, :2], apart, rtol=1e-12)
+    assert not found[2].any() and not found[:, 2].any()
+    covariance[0] = covariance[:, 0] = 0.0
+    np.testing.assert_allclose(mirror_file._holding(covariance, np.zeros(3, bool)), covariance, rtol=1e-12)
+
+
+def test_numbers_that_are_known_but_for_an_error_have_it_relative_to_their_size():
+    """b falls, c is lost in its error, d is known exactly, e is 0; a and b go together, f is open."""
+    numbers = {"a": 2.0, "b": -4.0, "c": 0.01, "d": 7.0, "e": 0.0, "f": 0.5}
+    covariance = np.diag([0.04, 0.16, 1.1, 0.0, 0.0, 1.0])
+    covariance[0, 1] = covariance[1, 0] = 0.02
+    keys, found = mirror_file._relative(numbers, covariance)
+    assert keys == ["a", "b", "f"]
+    np.testing.assert_allclose(found, [[0.01, 0.0025, 0.0], [0.0025, 0.01, 0.0], [0.0, 0.0, 1.0]], atol=1e-12)
+    numbers["c"] = 0.0106
+    assert mirror_file._relative(numbers, covariance)[0] == ["a", "b", "c", "f"]
+    assert mirror_file._relative({"a": 2.0}, np.array([[1e-24]]))[0] == []
+    assert mirror_file._relative({"a": 2.0}, np.array([[1e-23]]))[0] == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("covariance", "errors", "between"),
+    [
+        ([[0.0123456789**2]], ["0.0123"], [["1.000000"]]),
+        (
+            [[4e-4, -1e-4], [-1e-4, 1e-2]],
+            ["0.02", "0.1"],
+            [["1.000000", "-0.050000"], ["-0.050000", "1.000000"]],
+        ),
+        (
+            [[1e-2, 0.9999999e-2], [0.9999999e-2, 1e-2]],
+            ["0.1", "0.1"],
+            [["1.00000000", "0.99999990"], ["0.99999990", "1.00000000"]],
+        ),
+    ],
+)
+def test_a_covariance_is_printed_with_the_digits_that_each_combination_of_it_needs(covariance, errors, between):
+    assert mirror_file._rounded(np.array(covariance)) == (errors, between)
+
+
+@pytest.mark.parametrize(
+    ("text", "quoted", "line"),
+    [
+        ("µm é", '"µm é"', "µm é"),
+        ("a\x7fb", '"a\\u007fb"', "a b"),
+        ('a"b\\', '"a\\"b\\\\"', 'a"b\\'),
+        ("a\nb\tc", '"a\\nb\\tc"', "a b c"),
+        ("", '""', ""),
+    ],
+)
+def test_a_text_in_a_mirror_file_stays_within_its_quotes_and_its_line(text, quoted, line):
+    assert mirror_file._quoted(text) == quoted and tomllib.loads(f"a = {quoted}") == {"a": text}
+    assert mirror_file._one_line(text) == line
+
+
+def test_the_colour_of_a_residual_of_one_step_is_the_sum_of_its_correlations_until_a_pair_is_negative():
+    """(80 - 3 k) / 80 at lag k: the pair of lags 26 and 27 is the last that is positive."""
+    step = np.repeat([-1.0, 1.0], 40)
+    assert colour_inflation([step]) == pytest.approx(26.65, rel=1e-9)
+    assert colour_inflation([step[:40:2], np.tile([1.0, -1.0], 30), step, step[20:60]]) == pytest.approx(
+        26.65, rel=1e-9
+    )
+    assert colour_inflation([np.tile([1.0, -1.0], 30)]) == 1.0
+    assert colour_inflation([np.zeros(9)]) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("losses", "best", "chance"),
+    [
+        ([[1.0, 2.0, 3.0]], [[1.0, 2.0, 3.0]], True),
+        ([[1.0, 2.0, 3.0, 9.0]], [[1.0, 2.0, 3.0, 1.0]], True),
+        ([np.tile([2.5, 1.0], 50)], [np.tile([1.0, 2.2], 50)], True),
+        ([np.tile([4.0, 1.0], 50)], [np.tile([1.0, 1.9], 50)], False),
+        ([np.tile([1.0, 1.9], 50)], [np.tile([4.0, 1.0], 50)], True),
+        ([[2.0] * 20], [[1.0] * 20], False),
+    ],
+)
+def test_a_difference_of_two_standard_errors_is_no_chance(losses, best, chance):
+    assert may_be_chance([np.array(each) for each in losses], [np.array(each) for each in best]) is chance

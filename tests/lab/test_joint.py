@@ -29,7 +29,7 @@ from microrad.lab.identify.records import SiRecord, centred, memory, si_records
 from microrad.lab.identify.statistics import propagated
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
-from microrad.mirror.hysteresis import Creep, PrandtlIshlinskii
+from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from places import DATA
 from truths import behind_resonance, bouc_wen, creep, plays, recorded, small_multisine, two_sines
 
@@ -732,3 +732,74 @@ def test_a_record_is_thinned_by_halves_until_straight_lines_make_its_drive(sampl
     found = thin_record(record, most, bent)
     assert found.drive_v.size == kept
     assert found.step_s == pytest.approx(0.01 * math.ceil(samples / kept))
+
+
+@pytest.mark.parametrize(
+    ("records", "decades"),
+    [
+        ([(1000, 1e-3)], [-2, -1, 0]),
+        ([(999, 1e-3)], [-2, -1]),
+        ([(100_000, 1e-4)], [-2, -1, 0, 1]),
+        ([(50, 1.0)], [1]),
+        ([(3, 1.0)], [0]),
+        ([(30, 5e-3), (9000, 5e-2)], [-1, 0, 1, 2]),
+        ([(2000, 1e-5), (20, 1e-3)], [-2]),
+    ],
+)
+def test_decades_of_creep_are_between_ten_of_the_shortest_steps_and_the_longest_record(records, decades):
+    given = [SimpleNamespace(drive_v=np.zeros(samples), step_s=step) for samples, step in records]
+    assert time_constants(given) == pytest.approx([10.0**k for k in decades])
+
+
+@pytest.mark.parametrize(
+    ("model", "admissible", "falling"),
+    [
+        (PrandtlIshlinskii((0.0, 1.0), (3.0, 0.0)), True, False),
+        (PrandtlIshlinskii((0.0, 1.0), (3.0, -1.0)), False, False),
+        (PrandtlIshlinskii((0.0, 1.0), (-3.0, -1.0)), True, True),
+        (BoucWen(2e-5, 0.0, -1e-5, 0.0, 1.0, 0.0), True, False),
+        (BoucWen(2e-5, 0.0, -1.0009e-5, 0.0, 1.0, 0.0), True, False),
+        (BoucWen(2e-5, 0.0, -1.0011e-5, 0.0, 1.0, 0.0), False, False),
+        (BoucWen(-2e-5, 0.0, 1e-5, 0.0, 1.0, 0.0), True, True),
+        (BoucWen(-2e-5, 0.0, 1.2e-5, 0.0, 1.0, 0.0), False, True),
+    ],
+)
+def test_a_joint_fit_is_admissible_to_a_thousandth_of_its_gain_whichever_way_it_runs(model, admissible, falling):
+    fit = made_of(model=model, linear=None, structure=SimpleNamespace(parameters=(1, 2, 3)))
+    assert (fit.admissible, fit.falling, fit.delay_s, fit.parameter_count) == (admissible, falling, 0.0, 3)
+
+
+def test_forms_have_their_family_their_extras_and_what_they_need():
+    rows = [
+        f"{name}: {form.family} [{' '.join(form.free)}]{' creep' * form.creep}{' linear' * form.needs_linear}"
+        for name, form in FORMS.items()
+    ]
+    assert rows == [
+        "linear: linear [] linear",
+        "bouc_wen_classical: bouc_wen [exponent]",
+        "bouc_wen_joint: bouc_wen [d2 delta] linear",
+        "bouc_wen_asymmetric: bouc_wen [d2 delta gamma eta]",
+        "bouc_wen_creep: bouc_wen [d2 delta] creep",
+        "prandtl_ishlinskii_joint: prandtl_ishlinskii [] linear",
+        "prandtl_ishlinskii_rate: prandtl_ishlinskii [widening]",
+        "prandtl_ishlinskii_creep: prandtl_ishlinskii [] creep",
+        "prandtl_ishlinskii_rate_creep: prandtl_ishlinskii [widening] creep",
+    ]
+
+
+@pytest.mark.parametrize("hold", ["first-order", "zero-order"])
+@pytest.mark.parametrize(("delay_s", "late_s"), [(0.0, 0.0), (2e-3, 0.0), (1e-3, 1e-3)])
+def test_columns_behind_a_linear_part_are_late_by_both_delays(hold, delay_s, late_s):
+    """A lag of 20 ms of two ramps and a sine from rest, each a column of its own."""
+    linear = LinearPoles(Roots((1 / (2 * math.pi * 0.02),), (1.0,)), Roots((), ()), 1e-6, delay_s)
+    run = FitRecord("r", np.zeros((9, 1)), np.zeros((9, 1)), 1e-3, 1, 0, np.zeros((9, 0)), hold=hold, late_s=late_s)
+    time = np.arange(200)
+    columns = np.column_stack([np.sin(time / 25.0), 0.01 * time, -0.03 * time])
+    found = joint.behind_linear_part(columns, linear, run)
+    expected, keep = np.zeros_like(columns), math.exp(-1 / 20)
+    for k in range(199):
+        u, slope = columns[k], 20.0 * (columns[k + 1] - columns[k]) * (hold == "first-order")
+        expected[k + 1] = keep * (expected[k] - u + slope) + u + slope / 20.0 - slope
+    shift = round((delay_s + late_s) / 1e-3)
+    assert_allclose(found[40:], expected[40 - shift : 200 - shift], rtol=1e-6)
+    assert joint.behind_linear_part(columns, None, run) is columns

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from microrad.core import lti
-from microrad.lab.identify.linear import axis, order
+from microrad.lab.identify.linear import amplitude, axis, order
 from microrad.lab.identify.linear import fit as fit_module
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import (
@@ -904,3 +904,147 @@ def test_the_modes_that_are_missed_least_are_a_pair_or_two_real_poles():
     assert second[0].tolist() == poles[2:].tolist()
     alone = ModalModel(poles[2:3], np.ones((1, 1)) + 0j, c[:, 2:3], np.zeros((1, 1)))
     assert order._without_weakest(equations, alone) == []
+
+
+def known_by(poles_hz, zeros_hz, dc=1.0, edge=1.0):
+    """Roots in Hz and one gain at rest and at the lowest frequency, with errors of their own."""
+    one = (np.array([[v]]) for v in (dc, 0.0123, edge, 0.004))
+    roots = (np.array(each, dtype=complex) * 2 * np.pi for each in (poles_hz, zeros_hz))
+    poles, zeros = roots
+    return Uncertainty(poles, np.zeros(len(poles)), zeros, np.zeros(len(zeros)), *one, 0.0)
+
+
+FLANK = "outside the {what} band, 1 to 50 Hz: the {of} shows only the flank, so take {them} as a fit of that flank"
+REST = "the gain at zero frequency, {} ± 0.012, is extrapolated: at 1 Hz, the lowest {{what}} frequency, it is {}; use "
+
+
+@pytest.mark.parametrize(("of", "what"), [("recording", "excited"), ("table", "measured")])
+@pytest.mark.parametrize(
+    ("known", "told"),
+    [
+        (known_by([-5], [-300j]), [("zero at 300 Hz", "it")]),
+        (known_by([-0.5, -30 + 1j, -30 - 1j], [-50.4]), [("pole at 0.5 Hz", "it"), ("zero at 50.4 Hz", "it")]),
+        (
+            known_by([-0.5, -70 + 1j, -70 - 1j], [-0.5, 0.5001, -90]),
+            [("poles at 0.5, 70 Hz", "them"), ("zeros at 0.5, 90 Hz", "them")],
+        ),
+        (known_by([-1.0, -50.0], [1.0, 50j]), []),
+        (known_by([-7000.0], []), [("pole at 7000 Hz", "it")]),
+        (known_by([-5], [-6], dc=-0.9), [REST.format("-0.9", "1 ± 0.004")]),
+        (known_by([-5], [-6], dc=-20.0, edge=18.0), [REST.format("-20", "18 ± 0.004")]),
+        (known_by([-5], [-6], dc=1.04), []),
+        (known_by([-0.25], [], dc=0.94), [("pole at 0.25 Hz", "it"), REST.format("0.94", "1 ± 0.004")]),
+    ],
+)
+def test_what_lies_beyond_the_band_is_told_of_one_and_of_several_in_words_of_a_recording_and_a_table(
+    known, told, of, what
+):
+    mirror_of = " of the mirror" if of == "recording" else ""
+    expected = [
+        f"{each[0]} {FLANK.format(what=what, of=of, them=each[1])} (drift, delay), not as dynamics{mirror_of}."
+        if isinstance(each, tuple)
+        else f"{each.format(what=what)}the latter."
+        for each in told
+    ]
+    words = {} if of == "recording" else {"of": of, "what": what}
+    assert list(range_warnings(known, (1.0, 50.0), **words)) == expected
+
+
+def scored(order, criterion, chi_square=10.0, freedom=5):
+    return fit_module.OrderScore(order, 2 * order + 1, chi_square, freedom, criterion, 0.1)
+
+
+LEAST = (
+    "order 2 has the least criterion, {} (chi-square + parameters x ln values); squared distance over its variance, "
+    "per degree of freedom, by order: {} (1 is what a true model leaves{}"
+)
+
+
+@pytest.mark.parametrize(
+    ("scan", "end"),
+    [
+        ([scored(1, 50.0), scored(2, 30.0), scored(4, 33.0)], "; order 4 is worse by 3"),
+        ([scored(1, 31.5), scored(2, 30.0), scored(4, 33.0)], "; order 1 is worse by 1.5"),
+        ([scored(2, 30.0)], ""),
+    ],
+)
+def test_the_reason_of_an_axis_names_the_next_best_on_either_side(scan, end):
+    per = ", ".join(f"{one.order}: 2" for one in scan)
+    expected = LEAST.format("30", per, "; what no order explains counts as noise)") + end
+    assert axis._reason(next(one for one in scan if one.order == 2), scan) == expected
+
+
+@pytest.mark.parametrize(
+    ("rms", "amplitudes", "sizes"),
+    [((0.3, 0.1, 0.2), (1.0, 2.0, 4.0), "0.1 0.2 0.3"), ((1.0, 3.0), (4.0, 1.0), "1 3")],
+)
+def test_dependence_on_the_amplitude_is_from_the_smallest_to_the_largest(rms, amplitudes, sizes):
+    """Gains that fall to a quarter or grow with the amplitude, and a resonance that moves with them."""
+    rank = np.argsort(rms)
+    own = amplitude.AmplitudeDependence(
+        np.sort(rms),
+        np.array(amplitudes)[rank],
+        10.0 * np.array(amplitudes)[rank],
+        np.ones(len(rms)),
+        np.ones(len(rms)),
+    )
+    first, last = np.array(amplitudes)[rank][[0, -1]]
+    assert own.gain_rise_percent == pytest.approx(100.0 * (last - first) / first)
+    assert own.resonance_shift_hz == pytest.approx(10.0 * (last - first))
+    assert own.drive_rms.tolist() == [float(v) for v in sizes.split()]
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_one_amplitude_shows_no_dependence(count):
+    with pytest.raises(IdentificationError) as refused:
+        amplitude_dependence([SimpleNamespace()] * count)
+    assert str(refused.value) == f"{count} amplitude given; at least two are needed to see a dependence."
+
+
+@pytest.mark.parametrize(
+    ("direct", "own"),
+    [(True, "11 12 -13 .1 .2 14 15 16 .3 .4 17 18 -19 .5 .6"), (False, "11 12 -13 14 15 16 17 18 -19")],
+)
+def test_a_model_is_the_vector_of_its_numbers_in_their_order_and_back(direct, own):
+    """One real pole and one pair, two drives, three outputs: 3 + 6 numbers in common, then those of each output."""
+    poles = np.array([-7.0, -2.0 + 9.0j])
+    b, c = np.array([[1, 2], [3 + 4j, 5 + 6j]]), np.array([[11, 12 - 13j], [14, 15 + 16j], [17, 18 - 19j]])
+    model = ModalModel(poles, b, c, np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]]) * direct)
+    found = pack(model, direct)
+    assert found.tolist() == [float(v) for v in f"-7 -2 9 1 2 3 5 4 6 {own}".split()]
+    back = unpack(found, model)
+    for name in ("poles_rad_s", "input_vectors", "output_vectors", "direct"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(model, name))
+
+
+@pytest.mark.parametrize("drop", [0, 3])
+@pytest.mark.parametrize("steady", [True, False])
+def test_an_error_of_a_record_is_without_its_mean_behind_what_is_left_out(steady, drop):
+    """Two periods and a half; in steady state the half is no part of it."""
+    model = ModalModel(np.array([-30.0 + 0j]), np.array([[2.0 + 0j]]), np.array([[5.0 + 0j]]), np.array([[0.5]]))
+    drive = philox(3).standard_normal((20, 1)) + 2.0
+    record = Recording("r", "", drive, philox(4).standard_normal((20, 1)), 100.0, ("u",), ("y",), 8)
+    found = output_error(model, record, "first-order", steady=steady, drop=drop)
+    if steady:
+        modelled = np.vstack([simulate_periodic(model, drive[k : k + 8], 100.0, "first-order") for k in (0, 8)])
+    else:
+        modelled = simulate(model, drive - drive[0], 100.0, "first-order")
+    left = (record.output[: len(modelled)] - modelled)[drop:]
+    np.testing.assert_allclose(found, left - left.mean(), atol=1e-12)
+    assert len(found) == (16 if steady else 20) - drop
+
+
+@pytest.mark.parametrize(
+    ("errors", "percent"),
+    [
+        ((0.0, 0.0), (100.0, 100.0)),
+        ((1.0, 1.0), (50.0, 90.0)),
+        ((2.0, -10.0), (0.0, 0.0)),
+        ((-3.0, 25.0), (-50.0, -150.0)),
+    ],
+)
+def test_the_fit_of_each_output_is_about_its_own_mean(errors, percent):
+    """Outputs of 5 +- 2 and -300 +- 10, and errors of one size each."""
+    sign = np.array([[1.0], [-1.0], [1.0], [-1.0]])
+    measured = np.hstack([5.0 + 2.0 * sign, -300.0 + 10.0 * sign])
+    np.testing.assert_allclose(fit_percent(measured, sign * errors), percent, atol=1e-9)

@@ -1,5 +1,7 @@
 """What the page that looks on is shown of a fit: two periods of each loop, and the extremes of its residual."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -103,3 +105,45 @@ def test_extremes_of_two_columns_are_those_of_either():
     one[[3, 25]], other[[6, 33]] = (5.0, -5.0), (-4.0, 4.0)
     assert {3, 6, 25, 33} <= {*live_fit.extremes([one, other], 4).tolist()}
     assert live_fit.extremes([one, other], 4).tolist() == [0, 3, 6, 20, 25, 33, 39]
+
+
+def test_a_line_of_the_file_has_every_number_of_each_loop_by_its_name(tmp_path):
+    """Two loops of five periods of twenty samples; what is drawn has seven digits."""
+    one = judged(count=2)
+    one.recordings = (one.recordings[0], replace(one.recordings[1], path="b/other.csv", rate_hz=50.0))
+    one.predictions = (one.predictions[0], replace(one.predictions[1], start=10, split=90))
+    write = live_fit.live_fit_writer(str(tmp_path / "progress"))
+    write(one)
+    write(judged(count=1))
+    first, second = (json.loads(line) for line in (tmp_path / "fits").read_text(encoding="ascii").splitlines())
+    assert list(first) == ["model", "fit_rms_percent", "held_out_rms_percent", "loops"]
+    assert [first[key] for key in list(first)[:3]] == ["plays", 1.5, 2.5]
+    keys = ["name", "drive", "measured_rad", "model_rad", "time_s", "residual_rad", "split_s"]
+    assert [list(loop) for loop in first["loops"]] == [keys, keys]
+    assert [(loop["name"], loop["split_s"]) for loop in first["loops"]] == [("r0.csv", 0.6), ("other.csv", 1.8)]
+    assert [(loop["time_s"][0], loop["time_s"][-1]) for loop in first["loops"]] == [(0.2, 0.99), (0.2, 1.98)]
+    assert first["loops"][1]["residual_rad"] == [*[9.0] * 10, *(float(f"{1e-3 * k:.7g}") for k in range(20, 100))]
+    assert first["loops"][0]["drive"] == [float(f"{3 + np.sin(0.1 * np.pi * k):.7g}") for k in range(60, 100)]
+    assert len(second["loops"]) == 1
+
+
+def test_a_drive_of_many_samples_and_its_residual_are_thinned_to_six_hundred_with_both_ends():
+    one = judged(periods=2, samples=5000, start=100)
+    residual = np.zeros(5000)
+    residual[[99, 101, 2345, 4998]] = 7.0, -3.0, 5.0, 2.0
+    one.predictions = (replace(one.predictions[0], model_rad=one.predictions[0].measured_rad - residual),)
+    (loop,) = live_fit.thin_fit(one).loops
+    assert len(loop.drive) == len(loop.model_rad) == 600
+    assert loop.drive[0] == 3.0 and loop.drive[-1] == float(f"{one.recordings[0].drive[-1, 0]:.7g}")
+    at = dict(zip(loop.time_s, loop.residual_rad, strict=True))
+    assert [round(each, 9) for each in at.values() if abs(each) > 1e-9] == [-3.0, 5.0, 2.0]
+    assert at[1.01] == pytest.approx(-3.0) and at[23.45] == pytest.approx(5.0) and at[49.98] == pytest.approx(2.0)
+    assert (min(at), max(at)) == (1.0, 49.99)
+
+
+@pytest.mark.parametrize(("samples", "points"), [(10, 10), (11, 10), (12, 4), (0, 4), (1, 4), (13, 5), (601, 600)])
+def test_of_a_column_that_stays_where_it_is_the_ends_and_the_begins_of_its_stretches_are_kept(samples, points):
+    rows = live_fit.extremes([np.zeros(samples)], points)
+    edges = np.linspace(0, samples, points // 2 + 1).astype(int)[:-1]
+    expected = set(range(samples)) if samples <= points else {*edges.tolist(), samples - 1}
+    assert rows.tolist() == sorted(expected)

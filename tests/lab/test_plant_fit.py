@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from microrad.core import lti
 from microrad.lab.identify import IdentificationError
 from microrad.lab.identify.hysteresis import plant_fit, structures
 from microrad.lab.identify.hysteresis.bouc_wen import made_rising
@@ -23,7 +24,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     simulate_record,
     upsampled,
 )
-from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, hysteretic_oscillator, one_axis
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, hysteretic_oscillator, one_axis, poles_of
 from microrad.lab.recording import Recording, read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
@@ -666,3 +667,122 @@ def test_a_run_of_several_steps_a_sample_is_late_by_both_delays_and_every_fourth
     later = simulate_record(plant, run, delay_s=0.03)
     assert later.shape == (100, 1)
     assert_allclose(later[2:, 0], 2.0 * drive[3:395:4][: len(later) - 2, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("poles", "zeros", "band_hz", "frequencies", "dampings", "left", "at_hz"),
+    [
+        ([-3, -500 + 2000j], [-4], (1.0, 400.0), [328.106321], [0.242535625], [], 5.72805657),
+        ([-3, -500 + 2000j], [-4, -9e4], (1.0, 400.0), [328.106321], [0.242535625], [], 5.72805657),
+        ([-3, -500 + 2000j], [-900], (1.0, 400.0), [0.477464829, 328.106321], [1.0, 0.242535625], [900], 5.72805657),
+        ([-300, -800], [-900], (2.0, 30.0), [47.7464829, 127.323954], [1.0, 1.0], [900], np.sqrt(60.0)),
+        ([-2 + 1j, -50 + 4000j], [-3, -1.5], (0.5, 300.0), [636.669506], [0.0124990236], [], 5.64211621),
+        (
+            [-50 + 40j, -700],
+            [],
+            (20.0, 90.0),
+            [np.sqrt(4100) / (2 * pi), 350 / pi],
+            [50 / np.sqrt(4100), 1.0],
+            [],
+            20.0,
+        ),
+    ],
+    ids=["creep and its zero", "zero beyond", "pole alone", "real", "slow pair", "pair below"],
+)
+def test_slow_poles_with_as_many_slow_zeros_and_zeros_above_the_rate_are_left_out(
+    poles, zeros, band_hz, frequencies, dampings, left, at_hz
+):
+    every = np.array([q for p in poles for q in ((p, np.conj(p)) if np.imag(p) else (p,))], dtype=complex)
+    found = poles_of(lti.modal_from_roots(np.array(zeros, dtype=complex), every, 5.0), band_hz, 2000.0)
+    assert found.poles.frequencies_hz == pytest.approx(frequencies, rel=1e-6)
+    assert found.poles.dampings == pytest.approx(dampings, rel=1e-6)
+    assert found.zeros.frequencies_hz == pytest.approx([each / (2 * np.pi) for each in left], rel=1e-6)
+    assert found.zeros.dampings == (1.0,) * len(left)
+    assert found.normalise_at_hz == pytest.approx(at_hz, rel=1e-6)
+    assert (found.delay_s, found.delay_error_s) == (0.0, np.inf)
+
+
+@pytest.mark.parametrize(
+    ("places", "kept"),
+    [((), [0, 1, 2]), ((0,), [1, 2]), ((2, 0), [1]), ((1,), [0, 2]), ((0, 1, 2), []), ((7,), [0, 1, 2])],
+)
+def test_roots_without_some_keep_each_frequency_with_its_damping(places, kept):
+    roots = Roots((3.0, 5.0, 8.0), (0.1, 1.0, -0.4))
+    assert roots.without(*places) == Roots(
+        tuple((3.0, 5.0, 8.0)[k] for k in kept), tuple((0.1, 1.0, -0.4)[k] for k in kept)
+    )
+
+
+LEVELS = np.array([[0.0, 1.0], [2.0, 5.0], [1.0, -1.0], [3.0, 0.5]])
+BETWEEN = {
+    ("linear", 1): ("0 2 1", "1 5 -1"),
+    ("linear", 2): ("0 1 2 1.5 1", "1 3 5 2 -1"),
+    ("linear", 4): ("0 .5 1 1.5 2 1.75 1.5 1.25 1", "1 2 3 4 5 3.5 2 .5 -1"),
+}
+
+
+@pytest.mark.parametrize(("hold", "factor"), BETWEEN)
+def test_a_drive_of_two_actuators_is_straight_between_its_samples(hold, factor):
+    expected = [[float(v) for v in row.split()] for row in BETWEEN[hold, factor]]
+    np.testing.assert_allclose(upsampled(LEVELS[:3], factor, hold).T, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("hold", "drive"),
+    [
+        ("linear", ["0 1 2 1.5 1 2 3 1.5", "1 3 5 2 -1 -.25 .5 .75"]),
+        (
+            "band-limited",
+            [
+                "-1 .79289322 3 1.5 0 2.2071068 4 1.5",
+                "-.375 3.6730970 6.375 2.2588835 -2.375 -.92309699 1.875 .49111652",
+            ],
+        ),
+    ],
+)
+@pytest.mark.parametrize("offset", [True, False])
+def test_periods_of_two_actuators_become_two_of_the_drive_and_the_mean_of_those_behind_the_first(hold, drive, offset):
+    """Three periods and a sample: the last sample belongs to none."""
+    output = np.arange(26.0).reshape(13, 2) ** 1.5
+    record = Recording("p", "", np.vstack([LEVELS] * 3 + [LEVELS[:1]]), output, 100.0, ("a", "b"), ("x", "y"), 4)
+    (run,) = fit_records([record], factor=2, hold=hold, offset=offset, drop=3)
+    one = np.array([[float(v) for v in row.split()] for row in drive]).T
+    np.testing.assert_allclose(run.drive, np.vstack([one, one]), atol=1e-6)
+    mean = (output[4:8] + output[8:12]) / 2
+    np.testing.assert_allclose(run.output, np.vstack([np.zeros((4, 2)), mean]), rtol=1e-12)
+    assert (run.name, run.step_s, run.stride, run.first, run.weight) == ("p", 0.005, 2, 4, 1.0)
+    assert (run.hold, run.late_s, run.nuisance.shape) == ("first-order", 0.0, (4, int(offset)))
+    np.testing.assert_allclose(run.target, mean - mean.mean(axis=0) * offset, atol=1e-12)
+
+
+@pytest.mark.parametrize(("factor", "drop", "offset"), [(3, 2, True), (1, 0, False), (2, 5, True)])
+def test_a_recording_without_a_period_begins_at_rest_at_its_first_drive_value(factor, drop, offset):
+    drive, output = np.vstack([LEVELS, LEVELS[::-1]]), np.arange(16.0).reshape(8, 2) ** 1.5
+    record = Recording("q", "", drive, output, 50.0, ("a", "b"), ("x", "y"))
+    (run,) = fit_records([record], factor=factor, drop=drop, offset=offset)
+    np.testing.assert_allclose(run.drive[::factor], drive - drive[0], atol=1e-12)
+    np.testing.assert_allclose(run.drive[1], (drive[1] - drive[0]) / factor, atol=1e-12)
+    assert len(run.drive) == 7 * factor + 1
+    assert (run.step_s, run.stride, run.first) == (pytest.approx(0.02 / factor), factor, drop)
+    used = output[drop:]
+    np.testing.assert_allclose(run.target, used - used.mean(axis=0) * offset, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ([0.0, 5.0, 3.0], ["a: at its bound, 0 V"]),
+        ([9.0, 5.0, 3.0], ["a: at its bound, 9 V"]),
+        ([2.0, 5.0, 3.0], []),
+        ([2.0, 0.9, 3.0], ["b: not told from 0: standard error 1"]),
+        ([2.0, 1.9, 3.0], ["b: relative standard error 53 %"]),
+        ([0.3, 5.0, 0.5], ["a: not told from 0: standard error 0.4 V", "c: not told from 0: standard error 0.6 1/s"]),
+        ([0.7, 2.0, 1.1], ["a: relative standard error 57 %", "c: relative standard error 55 %"]),
+    ],
+)
+def test_a_number_at_its_bound_or_with_a_large_error_is_told_with_its_unit(values, told):
+    parameters = (Parameter("a", "V", 1.0, 0.0, 9.0), Parameter("b", "", 1.0), Parameter("c", "1/s", 1.0, -1.0))
+    found = plant_fit._not_identified(
+        Structure("s", parameters, lambda v: None), np.array(values), np.diag(np.array([0.4, 1.0, 0.6]) ** 2)
+    )
+    assert [f"{name}: {fact}" for name, fact in found] == told

@@ -650,3 +650,64 @@ def test_a_reason_of_an_order_is_told_in_full():
         "variance, per degree of freedom, by order: 1: 10, 4: 1.02 (1 is what a true model leaves; what no order "
         "explains counts as noise); order 1 is worse by 827"
     )
+
+
+@pytest.mark.parametrize(
+    ("root", "size", "delay", "states", "values"),
+    [
+        (Root(5.0, None), 5.0, 1 / (10 * math.pi), 1, [-10 * math.pi]),
+        (Root(-5.0, None), 5.0, -1 / (10 * math.pi), 1, [10 * math.pi]),
+        (Root(2.0, 0.6), 2.0, 1.2 / (4 * math.pi), 2, [4 * math.pi * (-0.6 + 0.8j), 4 * math.pi * (-0.6 - 0.8j)]),
+        (Root(2.0, -0.28), 2.0, -0.56 / (4 * math.pi), 2, [4 * math.pi * (0.28 + 0.96j), 4 * math.pi * (0.28 - 0.96j)]),
+        (Root(1.0, 0.0), 1.0, 0.0, 2, [2j * math.pi, -2j * math.pi]),
+    ],
+)
+def test_a_root_says_its_size_its_delay_its_states_and_its_values(root, size, delay, states, values):
+    assert (root.size_hz, root.states) == (size, states)
+    assert root.delay_s == pytest.approx(delay) and root.values == pytest.approx(values)
+
+
+@pytest.mark.parametrize(
+    ("lowest_hz", "lags"),
+    [
+        (200.0, ""),
+        (150.0, "0.01"),
+        (50.0, "0.01 0.0316227766"),
+        (2.0, "0.01 0.0316227766 0.1 0.316227766"),
+        (160.0, ""),
+    ],
+)
+def test_lags_are_two_a_decade_up_to_ten_radians_of_the_lowest_frequency(lowest_hz, lags):
+    found = axis._lags(SimpleNamespace(excited_hz=(lowest_hz, 999.0)))
+    assert found == pytest.approx([float(v) for v in lags.split()])
+
+
+@pytest.mark.parametrize(
+    ("like", "low", "high"),
+    [
+        (PoleZero((Root(9.0, None),), (), 0.0), "real", "far"),
+        (PoleZero((Root(9.0, 0.3),), (), 0.0), "near 1e-4", "far .9999"),
+        (
+            PoleZero((Root(9.0, 0.3), Root(5.0, None)), (Root(-8.0, None),), 0.0),
+            "near 1e-4 real -slow",
+            "far .9999 far slow",
+        ),
+        (PoleZero((Root(9.0, 0.3),), (Root(8.0, -0.2),), 0.0), "near 1e-4 near -.9999", "far .9999 far .9999"),
+    ],
+)
+def test_each_number_of_a_search_has_bounds_of_its_kind(like, low, high):
+    """A band of 2 to 50 Hz at 640 Hz with lags of 20 and 300 ms: no real pole is slower than the faster lag."""
+    problem, *_ = problem_of()
+    names = {
+        "real": math.log(1 / (2 * math.pi * 0.02) / problem.highest_hz),
+        "near": math.log(problem.lowest_hz / problem.highest_hz),
+        "far": math.log(5.0),
+        "slow": problem.highest_hz / problem.lowest_hz,
+        "-slow": -problem.highest_hz / problem.lowest_hz,
+    }
+    found = problem.bounds(like)
+    for own, words, delay in zip(
+        found, (low, high), (-2 * math.pi * problem.highest_hz / problem.rate_hz, math.pi), strict=True
+    ):
+        assert own == pytest.approx([*(names[w] if w in names else float(w) for w in words.split()), delay])
+    assert problem.pack(like).size == found[0].size

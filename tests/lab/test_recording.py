@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from microrad.lab.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
-from microrad.lab.recording.formats.text import TextSource
+from microrad.lab.recording.formats.text import Layout, TextSource, _are_units, _guess_delimiter, _is_regular, split
 from microrad.lab.recording.records import Finding, check_stated, digest_of, frozen, read_in, stated_units
 
 N = 400
@@ -597,3 +597,118 @@ def test_the_error_of_a_recording_is_one_line_with_its_evidence():
     error = RecordingError("a\nb.csv: y leads", [finding])
     assert (str(error), error.findings, error.page) == ("a\\u000ab.csv: y leads", (finding,), "recordings")
     assert RecordingError("x").findings == ()
+
+
+LAYOUT = Layout(",", 4, (("t", "u", "", "y (um)"), ("s", "V", "V", "")), 3, "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("column", "label"),
+    [(0, "column 0 ('t')"), (1, "column 1 ('u')"), (2, "column 2"), (3, "column 3 ('y (um)')"), (4, "column 4")],
+)
+def test_a_column_is_labelled_by_the_first_row_of_its_head(column, label):
+    assert LAYOUT.label(column) == label
+    assert LAYOUT.names == ("t", "u", "", "y (um)") and LAYOUT.units == ("s", "V", "V", "")
+    bare = replace(LAYOUT, headers=LAYOUT.headers[:1])
+    assert bare.units == ("", "", "", "um") and bare.label(column) == label
+    assert replace(LAYOUT, headers=()).names == ("0", "1", "2", "3")
+
+
+@pytest.mark.parametrize(
+    ("text", "delimiter", "columns", "regular"),
+    [
+        (b"1,2,3\n4,5,6\n", ",", 3, True),
+        (b"1,2,3\n4,5,6", ",", 3, True),
+        (b"1,2,3\n\n4,5,6\n", ",", 3, True),
+        (b"1,2,3\n4,5\n", ",", 3, False),
+        (b"1,2,3\n4,5", ",", 3, False),
+        (b"1,2,3,\n4,5,6\n", ",", 3, False),
+        (b"1,2\n4,5,6,7\n", ",", 3, False),
+        (b"1,2\r4,5\n", ",", 2, False),
+        (b'"1",2\n', ",", 2, False),
+        (b"1;2\n3;4\n", ";", 2, True),
+        (b"1\t2\n3\t4\n", "\t", 2, True),
+        (b"1 2  3\n  4\t5 6 \n", None, 3, True),
+        (b" 1 2 3\n4 5\n", None, 3, False),
+        (b"1 2 3\n \n", None, 3, False),
+        (b"", ",", 3, True),
+    ],
+)
+def test_lines_are_regular_where_each_that_is_filled_has_all_its_cells(text, delimiter, columns, regular):
+    assert _is_regular(text, replace(LAYOUT, delimiter=delimiter, columns=columns)) is regular
+
+
+@pytest.mark.parametrize(
+    ("line", "delimiter", "cells"),
+    [
+        ('a ,"b, c" ,d', ",", ["a", "b, c", "d"]),
+        ("a;b;", ";", ["a", "b", ""]),
+        ("  a  b\tc ", None, ["a", "b", "c"]),
+        ('"a b" c', None, ['"a', 'b"', "c"]),
+        ('"a\tb"\tc', "\t", ["a\tb", "c"]),
+        ("", ",", [""]),
+        ("", None, []),
+    ],
+)
+def test_a_line_is_split_at_what_stands_outside_of_quotes(line, delimiter, cells):
+    assert split(line, delimiter) == cells
+
+
+@pytest.mark.parametrize(
+    ("line", "delimiter"),
+    [
+        ("1,5;2,5", ";"),
+        ("1\t2 3", "\t"),
+        ("\t1 2\t", None),
+        ("1,5 2,5", None),
+        ("1,5e-3 -2,5 +0,1", None),
+        ("1,5 2.5", ","),
+        ("1,2,3 4", ","),
+        ("1,5", ","),
+        ("1 2", None),
+    ],
+)
+def test_what_stands_between_two_cells_is_guessed_from_a_line(line, delimiter):
+    assert _guess_delimiter(line) == delimiter
+
+
+@pytest.mark.parametrize(
+    ("units", "are"),
+    [
+        (("s", "V", "mrad"), True),
+        (("(s)", "[V]", ""), True),
+        (("s", "x"), False),
+        (("", ""), False),
+        (("µs", "°C", "-"), True),
+    ],
+)
+def test_a_row_is_of_units_where_each_filled_cell_is_one(units, are):
+    assert _are_units(units) is are
+
+
+@pytest.mark.parametrize(
+    ("size", "limit", "unpacked"),
+    [(1, 2_000, 1_000), (49, 2_000, 1_000), (51, 2_000, 1_020), (99, 2_000, 1_980), (101, 2_000, 2_000), (7, 500, 500)],
+)
+def test_a_file_may_unpack_to_twenty_times_its_size_between_two_bounds(tmp_path, monkeypatch, size, limit, unpacked):
+    monkeypatch.setattr(files, "_UNPACKED_BYTES", 1_000)
+    monkeypatch.setattr(files, "MAX_BYTES", limit)
+    (tmp_path / "a").write_bytes(b"0" * size)
+    assert files.most_unpacked(tmp_path / "a") == unpacked
+    assert (
+        files.too_large(tmp_path / "a", (unpacked // 4,), 4) == "" != files.too_large(tmp_path / "a", (unpacked, 2), 1)
+    )
+
+
+def test_the_first_samples_of_a_recording_keep_all_else():
+    made = recording_from_arrays(DRIVE, OUTPUT, 125.0, "r", 63)
+    part = made.first(250)
+    assert (part.samples, part.output.shape, part.period_samples, part.path, part.rate_hz) == (
+        250,
+        (250, 1),
+        63,
+        "r",
+        125.0,
+    )
+    assert part.sha256 == made.sha256 and part.findings == made.findings and made.step_s == 0.008
+    assert made.first(900).samples == N and part.drive[-1, 0] == DRIVE[249] and part.output[-1, 0] == OUTPUT[249]

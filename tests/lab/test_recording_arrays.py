@@ -519,3 +519,21 @@ def test_one_realisation_has_to_do_by_itself_where_no_other_is_judged_with_it(tm
     else:
         (read,) = read_arrays(tmp_path / "a.npz", "u", "y", **words)
         np.testing.assert_array_equal(read.drive, drive)
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ("samples", "is 'samples'; give a sequence of words: "),
+        (("sample", "channels"), "is 'sample,channels': 'sample' is no axis, samples is; "),
+        (("samples", "q"), "is 'samples,q': 'q' is no axis; "),
+        (("samples", "periods", "samples"), "is 'samples,periods,samples': samples stands twice; "),
+        (("channels", "periods"), "is 'channels,periods', without samples; "),
+        ((), "is '', without samples; "),
+    ],
+)
+def test_axes_that_are_none_are_told_in_all_words(tmp_path, axes, words):
+    with pytest.raises(RecordingError) as refused:
+        read_arrays(tmp_path / "a.npz", axes=axes)
+    advice = "name each axis of the array in its order, out of samples, channels, realisations, periods."
+    assert str(refused.value) == f"{tmp_path / 'a.npz'}: --axes (axes) {words}{advice}"

@@ -1,20 +1,23 @@
 """What the values of a recording give away: each check refuses with evidence, and the honest record passes."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from microrad.core.kernels import play_response
+from microrad.core.units import plain
 from microrad.lab.recording import (
     ACCEPTABLE,
+    Recording,
     RecordingError,
     check_together,
     multisine_recordings,
     read_recording,
     recording_from_arrays,
 )
-from microrad.lab.recording.checks import channel, sample_rate
+from microrad.lab.recording.checks import channel, drive_and_output, sample_rate, signals
 from microrad.lab.recording.checks.channel import _percent, _trend, clipping, drift, quantum
 from microrad.lab.recording.checks.drive_and_output import _correlation, _predicts, _response, excitation
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
@@ -1377,3 +1380,337 @@ def test_the_digits_of_a_time_are_those_that_all_its_samples_need(numbers, resol
 )
 def test_rounding_excuses_what_strays_by_a_digit_from_an_even_grid(steps, step_s, resolution_s, slack):
     assert sample_rate._slack(np.array(steps), step_s, resolution_s) == slack
+
+
+# ------------------------------------------------------------------------------------------------- by hand, bin by bin
+BINS = np.arange(1.0, 45.0)  # Hz
+TURN = 2 * np.pi
+
+
+def lead_of(phase, *, coherence=None, share=None, band=(2.0, 36.0), bins=BINS, inputs=2, rate_hz=1000.0):
+    """What the phases of the last of some inputs tell at 20 averages; those of the others are 1 rad."""
+    response = np.exp(1j * np.column_stack([*[np.ones(bins.size)] * (inputs - 1), phase]))
+    weight = 1.0 + bins / 50.0 if share is None else share
+    shares = np.column_stack([*[0.2 * weight] * (inputs - 1), weight])
+    known = np.full(bins.size, 0.98) if coherence is None else coherence
+    found = drive_and_output._Response(bins, response, known, shares, shares, 20.0)
+    return drive_and_output._lead("y", [f"u{k}" for k in range(inputs)], found, band, rate_hz), weight, known
+
+
+def told_lead(phase, weight, coherence, chosen, bins=BINS, rate_hz=1000.0):
+    """The words for a mean over some bins: phase and its error in degrees, frequency, and samples."""
+    share = weight[chosen] / weight[chosen].sum()
+    at_hz, mean = share @ bins[chosen], share @ phase[chosen]
+    error = np.sqrt(share**2 @ ((1 - coherence[chosen]) / (40.0 * coherence[chosen]) + 1e-12))
+    samples = mean / (TURN * at_hz) * rate_hz
+    angle = f"{plain(math.degrees(mean))} ± {plain(math.degrees(error), 1)}"
+    return f"y leads u1 by {angle} degrees at {plain(at_hz, 4)} Hz, {plain(samples)} samples"
+
+
+WITHIN = (BINS >= 2) & (BINS <= 39)
+UPPER = WITHIN & (math.sqrt(2 * 39) <= BINS)
+AHEAD = (
+    "; an output cannot come before its drive: swap input and output if they are the wrong way round, else align the "
+)
+
+
+@pytest.mark.parametrize(
+    ("phase", "chosen"),
+    [
+        (TURN * BINS * 2e-3, UPPER),
+        (TURN * BINS * 0.76e-3, UPPER),
+        (TURN * BINS * 2e-3 + np.pi, UPPER),
+        (TURN * BINS * 2e-3 - 3 * np.pi, UPPER),
+        (np.where(BINS > 39, -1.0, np.where(BINS < 2, 3.0, TURN * BINS * 1.5e-3)), UPPER),
+        (TURN * BINS * 3e-3 + np.where(BINS > 30, 2.5, 0.0), (math.sqrt(2 * 30) <= BINS) & (BINS <= 30)),
+        (0.2 + TURN * BINS * 1e-3, UPPER),
+    ],
+)
+def test_an_output_that_is_ahead_by_samples_is_refused_with_its_phase_in_the_upper_band(phase, chosen):
+    (found,), weight, coherence = lead_of(phase)
+    turned = phase - np.pi * np.round(phase[1] / np.pi)
+    assert found.message == f"{told_lead(turned, weight, coherence, chosen)}{AHEAD}channels in time"
+    assert (found.kind, found.channel, found.row, found.refused) == ("lead", "y", None, True)
+
+
+@pytest.mark.parametrize(
+    "phase",
+    [
+        -TURN * BINS * 2e-3,
+        TURN * BINS * 0.74e-3,
+        np.zeros(BINS.size),
+        np.full(BINS.size, 0.8),
+        np.full(BINS.size, -0.8),
+        TURN * BINS * 2e-3 + np.pi / 2,
+    ],
+)
+def test_an_output_that_lags_or_leads_by_less_than_a_sample_or_turns_at_once_is_none_ahead(phase):
+    assert lead_of(phase)[0] == []
+
+
+def test_a_lead_that_falls_with_frequency_is_noted_with_both_ends():
+    phase = np.arctan(0.8 / BINS)
+    (found,), weight, coherence = lead_of(phase)
+    lower = WITHIN & ~UPPER
+    top = weight[UPPER] @ phase[UPPER] / weight[UPPER].sum()
+    assert found.message == (
+        f"{told_lead(phase, weight, coherence, lower)}, and by {plain(math.degrees(top))} degrees higher in the band, "
+        "as behind a high-pass"
+    )
+    assert not found.refused
+
+
+def test_only_bins_that_are_known_and_one_frequency_alone_up_to_25_degrees_count_for_a_lead():
+    doubtful = np.where(BINS % 2 == 0, 0.98, 0.8)
+    phase = np.where(BINS % 2 == 0, TURN * BINS * 2e-3, -1.0)
+    (found,), weight, coherence = lead_of(phase, coherence=doubtful)
+    even = WITHIN & (BINS % 2 == 0) & (math.sqrt(2 * 38) <= BINS)
+    assert found.message.startswith(told_lead(phase, weight, coherence, even))
+    assert lead_of(phase, coherence=np.full(BINS.size, 0.8))[0] == []
+    for degrees, count in ((20.0, 1), (24.0, 1), (26.0, 0), (-20.0, 0)):
+        narrow = np.array([9.8, 10.0, 10.2])
+        told, weight, known = lead_of(np.full(3, math.radians(degrees)), bins=narrow, band=(10.0, 10.0))
+        assert len(told) == count
+        if told:
+            expected = told_lead(np.full(3, math.radians(degrees)), weight, known, np.ones(3, bool), narrow)
+            assert told[0].message == f"{expected}{AHEAD}channels in time"
+
+
+def test_a_mean_is_weighted_by_power_and_its_error_too():
+    found = drive_and_output._mean(*(np.array(v) for v in ([2.0, 5.0], [0.1, 0.5], [1.0, 3.0], [0.2, 0.4])))
+    assert found == pytest.approx((4.25, 0.4, math.sqrt(0.05**2 + 0.3**2)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "rate_hz", "band", "power"),
+    [
+        (3.0 + 2.0 * np.sin(TURN * 25 * np.arange(1000) / 1000.0), 500.0, (12.0, 13.0), 2.0),
+        (
+            np.sin(TURN * 7 * np.arange(997) / 997) + 0.5 * np.sin(TURN * 90 * np.arange(997) / 997),
+            997.0,
+            (6.0, 91.0),
+            0.625,
+        ),
+        (np.full(300, 4.5), 10.0, (0.0, 1 / 30), 0.0),
+    ],
+)
+def test_a_band_and_its_power_are_those_of_the_lines_within_a_window(values, rate_hz, band, power):
+    found, size = drive_and_output._band(values, rate_hz)
+    assert found == pytest.approx(band, rel=1e-9) and size == pytest.approx(power, rel=2e-3, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "power", "strongest", "told"),
+    [
+        (np.full(9, 100.0), 0.99e-6, 1.0, ("moves by 0.00099 rms about 100", "drive the mirror up and down")),
+        (np.full(9, -100.0), 0.81e-6, 1.0, ("moves by 0.0009 rms about -100", "drive the mirror up and down")),
+        (np.full(9, 100.0), 1.01e-6, 1.0, None),
+        (np.zeros(9), 0.0, 0.0, ("moves by 0 rms about 0", "drive the mirror up and down")),
+        (np.zeros(9), 2e-6, 2.5, ("has 8e-07 of the power of the strongest input", "drive it, or leave it out")),
+        (np.zeros(9), 2.5e-6, 2.5, None),
+    ],
+)
+def test_an_input_rests_by_its_own_offset_or_beside_a_stronger_one(values, power, strongest, told):
+    assert drive_and_output._stillness(values, power, strongest) == told
+
+
+@pytest.mark.parametrize(
+    ("drive", "hidden", "moves"),
+    [
+        (np.arange(41.0), 0.5, True),
+        (np.where(np.arange(41) < 12, 4.0, 0.0), 0.5, False),
+        (np.where(np.abs(np.arange(41) - 20) < 3, 1.0, 0.0), 0.5, True),
+        (np.where(np.arange(41) < 24, 0.0, 1.0), 0.5, True),
+        (np.where(np.arange(41) < 24, 0.0, 0.04) + np.where(np.arange(41) > 38, 1.0, 0.0), 0.5, False),
+        (np.where(np.arange(41) < 24, 7.0, 7.06) + np.where(np.arange(41) > 38, 1.0, 0.0), 0.5, True),
+    ],
+)
+def test_a_drive_moves_where_it_does_so_in_the_inner_half_of_a_flat_top(drive, hidden, moves):
+    """From sample 10 to 30, of which 15 to 25 count."""
+    given = np.array([10]), np.array([30]), np.array([hidden])
+    assert channel._moves([np.zeros(41), drive], *given).tolist() == [moves]
+    assert channel._moves([drive, np.zeros(41)], *given).tolist() == [moves]
+
+
+def topped(rise, fall, first=1.0, last=1.0, length=9):
+    """A plateau at 0 with flanks of some slopes, the samples beside it lower by shares of these."""
+    into = [-rise * (first + k) for k in range(40)][::-1]
+    out = [-fall * (last + k) for k in range(40)]
+    return np.array([*into, *[0.0] * length, *out])
+
+
+@pytest.mark.parametrize(
+    ("values", "hides"),
+    [
+        (topped(1.0, 1.0), 9 / 4),
+        (topped(1.0, 3.9), 9 / 4),
+        (topped(3.9, 1.0), 9 / 4),
+        (topped(1.0, 4.1), None),
+        (topped(4.1, 1.0), None),
+        (topped(1.0, 1.0, first=2.9), 9 / 4),
+        (topped(1.0, 1.0, first=3.1), None),
+        (topped(1.0, 1.0, last=2.9), 9 / 4),
+        (topped(1.0, 1.0, last=3.1), None),
+        (topped(1.0, -0.2), None),
+        (topped(1.0, 1.0, length=3), 3 / 4),
+        (topped(1.0, 1.0, length=2), None),
+        (topped(2.0, 1.5, length=12), 12 * 1.5 / 4),
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_flat_top_has_flanks_alike_without_jumps(values, hides, sign):
+    drive = np.sin(np.arange(values.size) / 3.0)
+    limit = np.flatnonzero(values == 0.0)
+    rows, hidden = channel._flat_tops(sign * values, limit, sign, 0.0, 100.0, [drive])
+    assert rows.tolist() == ([] if hides is None else [40])
+    if hides is not None:
+        assert hidden == pytest.approx([hides], rel=1e-12)
+        assert channel._flat_tops(sign * values, limit, sign, hides / 5.9, 100.0, [drive])[0].size == 0
+        assert channel._flat_tops(sign * values, limit, sign, hides / 6.1, 100.0, [drive])[0].size == 1
+        assert channel._flat_tops(sign * values, limit, sign, 0.0, hides / 3.9e-3, [drive])[0].size == 0
+        assert channel._flat_tops(sign * values, limit, sign, 0.0, hides / 4.1e-3, [drive])[0].size == 1
+
+
+def test_an_output_of_its_own_past_is_not_predicted_by_what_it_does_not_follow():
+    """Of two inputs one moves the output by a little, seven samples later; beyond eight nobody looks."""
+    one, two, own = (noise(seed, 3000) for seed in (1, 2, 3))
+    for lag, found in ((0, True), (7, True), (8, True), (12, False)):
+        moved = own + 0.2 * np.concatenate([np.zeros(lag), one[: one.size - lag]])
+        assert _predicts([two, one], moved) is found
+    assert not _predicts([two], own + 0.2 * one)
+    assert [_predicts([two, one], own + share * one) for share in (0.11, 0.12)] == [False, True]
+    slow = np.cumsum(own)
+    assert not _predicts([np.cumsum(two)], slow) and _predicts([slow + 0.01 * two], slow)
+
+
+@pytest.mark.parametrize(
+    ("values", "constant"),
+    [
+        ([0.0, 0.0], True),
+        ([5.0, 5.0 + 4e-12], True),
+        ([5.0, 5.0 + 6e-12], False),
+        ([-5.0, -5.0 + 4e-12], True),
+        ([1e-20, 2e-20], False),
+        ([-1e-15, 1e-15], False),
+        ([1e9, 1e9 + 5e-4], True),
+        ([1e9, 1e9 + 2e-3], False),
+    ],
+)
+def test_a_channel_is_constant_to_a_billionth_of_a_thousandth_of_its_size(values, constant):
+    assert signals._is_constant(np.array(values)) is constant
+    if constant:
+        for role, label, words in (
+            ("input", "the input, column 3 ('u')", "the input, column 3 ('u'), is"),
+            ("output", "the y", "the output, the y, is"),
+            ("output", "the output", "the output is"),
+        ):
+            remedy = "drive the mirror up and down" if role == "input" else "check the sensor's wiring and range"
+            with pytest.raises(RecordingError) as refused:
+                signals._check_varies("a.csv", role, label, np.array(values))
+            assert str(refused.value) == (
+                f"a.csv: {words} constant at {values[0]:g}, so nothing can be learnt from it; choose another column or "
+                f"{remedy}."
+            )
+
+
+@pytest.mark.parametrize(
+    ("mixed", "words"),
+    [
+        ((0.0, 0.0, 1.0), None),
+        ((2.0, 0.0, 0.0), "w is a copy of u: only "),
+        ((0.0, -3.0, 0.0), "w is a copy of v: only "),
+        ((1.0, 3.0, 0.0), "w is a copy of v and others: only "),
+        ((1.0, 0.0, 2e-3), None),
+        ((1.0, 0.0, 5e-4), "w is a copy of u: only 2e-05 %"),
+        ((1.0, 0.005, 5e-4), "w is a copy of u: only 2e-05 %"),
+    ],
+)
+def test_an_input_is_a_copy_where_a_millionth_of_it_is_its_own(mixed, words):
+    """Three sines that have nothing to do with each other, each of a variance of 1."""
+    own = [math.sqrt(2) * np.sin(TURN * k * np.arange(1000) / 1000) for k in (3, 5, 8)]
+    inputs = [7.0 + own[0], 4.0 * own[1] - 2.0, sum(m * each for m, each in zip(mixed, own, strict=True))]
+    found = signals.covariance(inputs)
+    np.testing.assert_allclose(np.diag(found), [1000.0, 16_000.0, 1000.0 * sum(m * m for m in mixed)], rtol=1e-9)
+    if words is None:
+        signals.check_separable("a.csv", found, ["u", "v", "w"])
+        return
+    with pytest.raises(RecordingError) as refused:
+        signals.check_separable("a.csv", found, ["u", "v", "w"])
+    said = str(refused.value)
+    assert said.startswith(f"a.csv: {words}")
+    assert said.endswith(
+        " % of its variance is its own, so their effects cannot be told apart; drive the inputs independently "
+        "(orthogonal multisines), or leave one out."
+    )
+    signals.check_separable("a.csv", found[:1, :1], ["u"])
+
+
+def test_an_output_that_nothing_moves_is_told_with_its_coherence_what_chance_reaches_and_its_correlation():
+    inputs, output = [noise(1), noise(2)], noise(3)
+    slow = [*(each - each.mean() for each in inputs), output - output.mean()]
+    short, long = (_response(slow[:-1], slow[-1], RATE_HZ, wanted) for wanted in (N / 32, N / 4))
+    best, bins = short.coherence.max(), short.coherence.size
+    chance = 1 - (1e-6 / bins) ** (1 / (short.averages - 2))
+    alike = _correlation(slow[:-1], slow[-1], N // 4)[1]
+    assert drive_and_output._unrelated("y", slow, short, long) == (
+        f"y does not follow the drive: the coherence is at most {best:.2g}, where unrelated noise reaches "
+        f"{chance:.2g}, and the correlation at any lag at most {alike:.2g}; a dead or unplugged sensor, or the wrong "
+        "column: check the wiring or name another channel"
+    )
+    assert best < chance < 1 and alike < 6 / math.sqrt(N)
+    certain = np.where(np.arange(bins) == 7, chance + 1e-6, short.coherence)
+    assert drive_and_output._unrelated("y", slow, replace(short, coherence=certain), long) == ""
+    doubt = np.where(np.arange(bins) == 7, chance - 1e-6, short.coherence)
+    assert drive_and_output._unrelated("y", slow, replace(short, coherence=doubt), long) != ""
+    usual = 2 / long.averages
+    limit = usual + 6 * usual / math.sqrt(long.coherence.size / 1.5) + 0.1
+    for mean, told in ((limit - 1e-6, True), (limit + 1e-6, False)):
+        coherence = np.full(long.coherence.size, mean)
+        assert bool(drive_and_output._unrelated("y", slow, short, replace(long, coherence=coherence))) is told
+
+
+@pytest.mark.parametrize(
+    ("counts", "of", "message"),
+    [
+        ((3, 2), (3, 3), "b: 3 inputs and 3 outputs, where a has 3 and 2"),
+        ((2, 3), (3, 3), "b: 3 inputs and 3 outputs, where a has 2 and 3"),
+    ],
+)
+def test_recordings_of_other_counts_are_told_with_both(counts, of, message):
+    def made(name, inputs, outputs):
+        names = tuple("uvw"[:inputs]), tuple("xyz"[:outputs])
+        return Recording(name, name, np.zeros((3, inputs)), np.zeros((3, outputs)), 1.0, *names)
+
+    with pytest.raises(RecordingError) as refused:
+        check_together([made("a", *counts)], [made("b", *of)])
+    assert str(refused.value) == f"{message}; name the same channels in each recording, in the same order."
+
+
+@pytest.mark.parametrize(
+    ("values", "drive", "share", "told"),
+    [
+        (np.repeat(np.arange(20.0), 50), np.linspace(0, 1, 1000), "5.3 %", True),
+        (np.repeat(np.arange(51.0), 20), np.linspace(0, 1, 1020), "2 %", False),
+        (np.repeat(np.arange(50.0), 20), np.linspace(0, 1, 1000), "2 %", True),
+        (np.repeat(np.arange(500.0), 20), np.linspace(0, 1, 10_000), "0.2 %", False),
+        (np.repeat(np.arange(501.0), 20), np.linspace(0, 1, 10_020), None, False),
+    ],
+)
+def test_an_output_of_fewer_than_fifty_steps_is_refused_and_from_five_hundred_on_fine(values, drive, share, told):
+    found = channel.quantisation("y", 0.25 * values, [np.zeros(1) + drive])
+    if share is None:
+        assert found == []
+        return
+    (one,) = found
+    steps, levels = values.max(), round(values.max()) + 1
+    assert one.message == (
+        f"y moves in steps of 0.25, {share} of its peak-to-peak ({levels} levels); a hysteresis loop of 2 % "
+        f"would be {0.02 * steps:.2g} steps wide: use a smaller range of the converter or a larger motion"
+    )
+    assert one.refused is told
+    noted = channel.quantisation("u", 0.25 * values, None)[0]
+    assert noted.message == (
+        f"u moves in steps of 0.25, {share} of its peak-to-peak ({levels} levels); a finer converter would "
+        "drive more evenly"
+    )
+    assert not noted.refused

@@ -20,12 +20,13 @@ from nptdms.log import log_manager
 from scipy.io import savemat
 from scipy.sparse import csc_array
 
+from microrad.core.units import printable
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
 from microrad.lab.recording.formats import text as text_format
-from microrad.lab.recording.formats.arrays import stated_rate
-from microrad.lab.recording.formats.hdf5 import _lzf_bytes
+from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels_of, indexed, stated_rate
+from microrad.lab.recording.formats.hdf5 import _lzf_bytes, unusable_dataset
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
-from microrad.lab.recording.formats.source import StatedRate, is_time_name, time_unit
+from microrad.lab.recording.formats.source import Container, StatedRate, is_time_name, time_unit
 from microrad.lab.recording.formats.tdms import _check_scales, check_structure
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
@@ -1949,3 +1950,249 @@ def test_a_name_is_that_of_the_first_row_of_headers_that_has_it(tmp_path, header
     twice = text_format.Layout(",", 3, (("t", "u", "u"), ("t", "u", "y")), 3, "utf-8")
     with pytest.raises(RecordingError, match="columns 1, 2 are all named 'u'; give the input column by its number"):
         text_format.column_of(tmp_path, twice, "u", "input")
+
+
+# ------------------------------------------------------------------------------------------------- word by word again
+NO_SAMPLES = "holds no samples; record again, or name another"
+NO_TEXT = "holds text, not real numbers; save numbers, or name another"
+REPACK = "pack it with gzip or not at all (h5repack -f GZIP=1 old.h5 new.h5)"
+
+
+def matlab_like(path):
+    """Datasets as MATLAB's version 7.3 leaves them, each of its own kind."""
+    with h5py.File(path, "w") as file:
+        file["group/sparse/data"] = np.arange(5.0)
+        file["group/sparse"].attrs["MATLAB_sparse"] = 3
+        for name, kind in {"c": b"char", "k": b"cell", "o": b"struct", "n": b"int16", "s": "single"}.items():
+            file[name] = np.arange(4.0)
+            file[name].attrs["MATLAB_class"] = kind
+        file["e"] = np.arange(2.0)
+        file["e"].attrs["MATLAB_empty"] = 1
+        file["text"] = np.array([b"a", b"b"], dtype=h5py.string_dtype("ascii", 3))
+        file["void"] = np.zeros((0, 3))
+        file["null"] = h5py.Empty("f8")
+        file.create_dataset("ragged", (2,), dtype=h5py.vlen_dtype(np.float64))
+        file.create_dataset("refs", (2,), dtype=h5py.ref_dtype)
+        file.create_dataset("lone", data=np.arange(300.0), chunks=(100,), shuffle=True, compression="gzip")
+        file.create_dataset("scaled", data=np.arange(300), chunks=(100,), scaleoffset=0)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("group/sparse/data", "is part of a sparse matrix; save it as full"),
+        ("c", NO_TEXT),
+        ("k", "holds cells; save the numbers of each cell as an array"),
+        ("o", "is an object of MATLAB, which only MATLAB reads; save its numbers as arrays"),
+        *((name, "") for name in ("n", "s", "lone")),
+        *((name, NO_SAMPLES) for name in ("e", "void", "null")),
+        ("text", NO_TEXT),
+        ("ragged", "holds rows of different lengths; save each as an array"),
+        (
+            "refs",
+            "holds references to other data (cells, or an array of structures, in MATLAB); save these as arrays",
+        ),
+        ("scaled", f"is packed by the filter 6 (scaleoffset), whose pieces cannot be checked; {REPACK}"),
+    ],
+)
+def test_a_dataset_says_in_its_own_words_why_it_is_no_channel(tmp_path, name, words):
+    path = matlab_like(tmp_path / "a.h5")
+    with h5py.File(path, "r") as file:
+        assert unusable_dataset(path, file[name]) == words
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "found"),
+    [
+        ("a.mat", b"MATLAB 7.3 MAT-file, cut off before the signature", "mat73"),
+        ("a.mat", b"MATLAB of its own".ljust(512) + b"\x89HDF\r\n\x1a\n", "mat73"),
+        ("a.mat", b"MATLAB 5.0 MAT-file", "mat"),
+        ("a.x", b"TDSm", "tdms"),
+        ("a.x", b"\x93NUMPY\x01", "npy"),
+        ("a.x", b"PK\x03\x04", "npz"),
+        ("a.x", b"\x89HDF\r\n\x1a\n", "hdf5"),
+        ("a.x", b'\xef\xbb\xbf"LabVIEW Measurement"', "lvm"),
+        ("a.x", b"LabVIEW Measurement\t", "lvm"),
+        ("a.x", b" LabVIEW Measurement\t", "text"),
+        ("a.x", b"MATLAB 4", "text"),
+        ("a.mat", b"0.1 0.2\n" * 3 + b"\x00", "text"),
+        ("a.x", b"\x00\x00\x00\x00", "text"),
+    ],
+)
+def test_a_format_is_told_by_how_its_content_begins(name, head, found):
+    assert files._content(Path(name), head) == found
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "words"),
+    [
+        (
+            "a.x",
+            b"TDSh",
+            "this is the index that LabVIEW writes beside a TDMS file, without the data; name the .tdms file.",
+        ),
+        *(
+            ("a.csv", head, "the file is compressed; unpack it first.")
+            for head in (b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf")
+        ),
+        (
+            "a.MAT",
+            b"\x00" * 20,
+            "this is not a MATLAB file of version 5 or later; load it in MATLAB and save it with -v7.",
+        ),
+        (
+            "a.mat",
+            b"0" * 19 + b"\x00",
+            "this is not a MATLAB file of version 5 or later; load it in MATLAB and save it with -v7.",
+        ),
+    ],
+)
+def test_a_content_that_is_of_no_use_says_what_to_do(name, head, words):
+    with pytest.raises(RecordingError) as refused:
+        files._content(Path(name), head)
+    assert str(refused.value) == f"{name}: {words}"
+
+
+def test_a_file_that_is_not_there_or_none_says_so_in_all_words(tmp_path):
+    (tmp_path / "drive-1.csv").write_text("1 2\n", encoding="utf-8")
+    (tmp_path / "empty.csv").touch()
+    near = "(nearest name in that directory: 'drive-1.csv')"
+    for name, words in (
+        ("", "this is a directory; name one file in it."),
+        ("drive-2.csv", f"there is no such file; check the path {near}."),
+        ("xyz.tdms", "there is no such file; check the path."),
+        ("none/xyz.tdms", "there is no such file; check the path."),
+        ("empty.csv", "the file is empty; record again or name another file."),
+    ):
+        with pytest.raises(RecordingError) as refused:
+            files.check_file(tmp_path / name)
+        assert str(refused.value) == f"{printable(str(tmp_path / name))}: {words}"
+
+
+def test_of_a_file_without_channels_five_reasons_are_told(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, **{f"v{k}": np.array(float(k)) for k in range(7)})
+    told = "; ".join(f"'v{k}' is a single number; name an array" for k in range(5))
+    assert refusal(path, 0, 1) == (
+        f"{path}: the NumPy file holds no channel of numbers ({told}); record again or name another file."
+    )
+    none = Container.__new__(Container)
+    none.path, none.kind, none.names, none.unusable = path, "X", (), {"a": "is none", "b": "is none, too"}
+    with pytest.raises(RecordingError) as refused:
+        none.resolve(3, "input")
+    assert str(refused.value) == (
+        f"{path}: there is no input channel 3: the X file has 0 channels, numbered from 0 ('a' is none; 'b' is none, "
+        "too)."
+    )
+    with pytest.raises(RecordingError) as refused:
+        none.resolve("z", "output")
+    assert str(refused.value) == (
+        f"{path}: no output channel is named 'z'; The channels are 'a' is none; 'b' is none, too; a number counted "
+        "from 0 does as well."
+    )
+
+
+def test_lvm_columns_that_are_not_named_are_shown_to_their_fortieth_letter(tmp_path):
+    path = lvm(tmp_path / "a.lvm")
+    names = b"Y_Value\t" + b"drive" * 9 + b"\toutput"
+    path.write_bytes(path.read_bytes().replace(b"X_Value\tdrive\toutput", names))
+    assert refusal(path, 0, 1) == (
+        f"{path}: line 19 should name the columns, beginning with 'X_Value', and reads "
+        f"'{printable(names.decode()[:40], chr(0xA0))}'; export the recording again from LabVIEW."
+    )
+
+
+@pytest.mark.parametrize(
+    ("shape", "axis", "channels"),
+    [
+        ((5,), 0, ["v"]),
+        ((1, 5), 1, ["v"]),
+        ((5, 1, 1), 0, ["v"]),
+        ((2, 5), 1, ["v[0]", "v[1]"]),
+        ((5, 3), 0, ["v[0]", "v[1]", "v[2]"]),
+        ((2, 2), 0, ["v[0]", "v[1]"]),
+        ((1, 2, 4), 2, ["v[0]", "v[1]"]),
+    ],
+)
+def test_samples_run_along_the_longest_axis_and_each_other_index_is_a_channel(shape, axis, channels):
+    values = np.arange(float(np.prod(shape))).reshape(shape)
+    found = channels_of([Variable("v", shape, values.dtype, values.__getitem__, "V")], {})
+    assert [each.name for each in found] == channels
+    columns = np.moveaxis(values, axis, -1).reshape(-1, shape[axis])
+    for each, column in zip(found, columns, strict=True):
+        assert (each.samples, each.unit, each.load().tolist()) == (shape[axis], "V", column.tolist())
+
+
+@pytest.mark.parametrize(
+    ("dtype", "shape", "words"),
+    [
+        ("c16", (5,), "holds complex numbers, not real numbers; save the real signal"),
+        ("?", (5,), "holds booleans, not real numbers; save numbers, or name another"),
+        ("S3", (5,), NO_TEXT),
+        ("U3", (5,), NO_TEXT),
+        ("M8[s]", (5,), "holds the type datetime64[s], not real numbers; save it as floating-point numbers"),
+        ([("real", "f8"), ("imag", "f8")], (5,), "holds complex numbers, not real numbers; save the real signal"),
+        (
+            [(name, "f4") for name in "abcdefg"],
+            (5,),
+            "holds records of a, b, c, d, e; save each of these as an array of its own",
+        ),
+        ("f8", (), "is a single number; name an array"),
+        ("i2", (1, 1), "is a single number; name an array"),
+        ("f8", (3, 0), NO_SAMPLES),
+        (
+            "f8",
+            (4, 7, 2, 3),
+            "is an array of shape (4, 7, 2, 3): name one channel of it with an index for each axis but the samples', "
+            "'v[0, 0, 0]', or read it whole by saying what each axis is: --axes (axes), such as "
+            "samples,channels,realisations,periods",
+        ),
+        (
+            "u1",
+            (10_001, 10_002),
+            "is an array of shape (10001, 10002): at most 10000 channels are listed; save the columns that you need",
+        ),
+    ],
+)
+def test_a_variable_that_is_no_channel_says_why(dtype, shape, words):
+    unusable = {}
+    assert channels_of([Variable("v", shape, np.dtype(dtype), None)], unusable) == ()
+    assert unusable == {"v": words}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "index"),
+    [
+        ("g/v[1, 2]", (slice(None), 1, 2)),
+        ("v[0,3]", (slice(None), 0, 3)),
+        *(
+            (wanted, None)
+            for wanted in ("v[2, 0]", "v[0, 4]", "v[1]", "v[0, 0, 0]", "w[0, 0]", "v", "v[]", 0, "v[-1, 0]")
+        ),
+    ],
+)
+def test_an_index_picks_a_channel_out_of_an_array_where_each_part_is_within_its_axis(wanted, index):
+    values = np.arange(72.0).reshape(9, 2, 4)
+    others = Variable("x", (9, 2), values.dtype, None), Variable("t", (9, 2, 4), np.dtype("S1"), None)
+    made = indexed(None, [*others, Variable("g/v", (9, 2, 4), values.dtype, values.__getitem__, "mV")], wanted)
+    if index is None:
+        assert made is None
+    else:
+        assert (made.name, made.samples, made.unit) == (wanted, 9, "mV")
+        assert made.load().tolist() == values[index].tolist()
+
+
+@pytest.mark.parametrize(
+    ("shape", "axes", "found"),
+    [
+        ((5, 1, 2), 3, (5, 1, 2)),
+        ((5, 1, 2), 2, (5, 2)),
+        ((5, 1, 2), 1, None),
+        ((1, 1), 2, (1, 1)),
+        ((1, 1), 0, ()),
+        ((4,), 2, None),
+    ],
+)
+def test_a_shape_may_leave_out_axes_of_length_one_where_all_of_them_are(shape, axes, found):
+    assert _with_axes(shape, axes) == found

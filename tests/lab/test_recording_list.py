@@ -631,3 +631,152 @@ def test_for_a_list_that_is_missing_or_none_no_other_kind_of_file_is_asked(tmp_p
             read_list(path)
         (fault,) = caught.value.faults
         assert fault.expected == "a list of recordings, with a table [recording.NAME] for each"
+
+
+GIVEN = 'input = "u"\noutput = "y"\n'
+ROLES = 'role = "loops" or role = "broadband" or role = "validation"'
+CHANNEL = '= "name of the channel", here or for all'
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\nrate = 5',
+            {
+                (
+                    "recording.x.rate",
+                    5,
+                ): 'is a number without a unit; a frequency with its unit; for example rate = "5 Hz"'
+            },
+        ),
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\nfrom = "-1 s"',
+            {("recording.x.from", 5): 'is below 0 s; a time with its unit, at least 0 s; for example from = "5 us"'},
+        ),
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\nto = "0 s"',
+            {("recording.x.to", 5): 'is not above 0 s; a time with its unit, above 0 s; for example to = "5 us"'},
+        ),
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\nfrom = "2 s"\nto = "2 s"\nrole = "fit"',
+            {
+                ("recording.x.to", 6): "is not above from; a later time",
+                ("recording.x.role", 7): f"is none of the choices; {ROLES}",
+            },
+        ),
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\nfrom = "2 s"\nto = "2 s"',
+            {("recording.x.to", 6): "is not above from; a later time"},
+        ),
+        (
+            f"{GIVEN}[recording]\nx = 3",
+            {("recording.x", 4): "is no table; [recording.x] with its file below it"},
+        ),
+        (
+            f"{GIVEN}[recording]",
+            {
+                ("recording", 3): "is no group of named tables; a table [recording.NAME] for each recording, with its "
+                "file"
+            },
+        ),
+        (
+            GIVEN,
+            {("recording", 0): "is missing; a table [recording.NAME] for each recording, with its file"},
+        ),
+        (
+            f'lever_arm = "0 mm"\n{GIVEN}[recording.x]\nfile = "a.csv"',
+            {("lever_arm", 1): 'is not above 0 m; a length with its unit, above 0 m; for example lever_arm = "5 mm"'},
+        ),
+        (
+            f'{GIVEN}period = 1\n[recording.x]\nfile = "a.csv"',
+            {("period", 3): "is below 2; a whole number without quotes, from 2 to 1000000000; for example period = 2"},
+        ),
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\naxes = ["channels"]',
+            {
+                ("recording.x.axes", 5): "does not say which axis is samples; the axes of the array in their order; "
+                'for example axes = ["samples", "channels", "realisations", "periods"]'
+            },
+        ),
+        (
+            '[recording.x]\nfile = "a.csv"\n[recording.y]\nfile = "b.csv"\noutput = 2',
+            {
+                ("recording.x.input", 1): f"is missing; input {CHANNEL}",
+                ("recording.x.output", 1): f"is missing; output {CHANNEL}",
+                ("recording.y.input", 3): f"is missing; input {CHANNEL}",
+            },
+        ),
+        (
+            f'{GIVEN}time = "t"\n[recording.x]\nfile = "a.npz"\naxes = ["samples"]\ninput = [1, 2]\n[recording.y]\n'
+            'file = "b.csv"\ntime = ["t", "s"]\noutput_file = "c.csv"',
+            {
+                ("recording.x.input", 7): "names several arrays, beside axes; one array with all channels",
+                ("recording.x.time", 4): "is no column of this recording; one column, of a file without axes",
+                ("recording.y.time", 10): "is no column of this recording; one column, of a file without axes",
+                ("recording.y.output_file", 11): "stands without axes; axes, which say what the arrays hold",
+            },
+        ),
+        (
+            f'{GIVEN}[recording.x]\nfile = "a.csv"\ninput_unit = "kV"\noutput_unit = "cm"',
+            {
+                ("recording.x.input_unit", 5): 'is none of the choices; input_unit = "V" or input_unit = "mV"',
+                ("recording.x.output_unit", 6): "is none of the choices; "
+                + " or ".join(f'output_unit = "{unit}"' for unit in ("rad", "mrad", "urad", "m", "mm", "um")),
+            },
+        ),
+    ],
+)
+def test_what_is_wrong_with_an_entry_is_told_in_all_words_on_its_line(tmp_path, text, told):
+    assert faults(tmp_path, text) == told
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "apart"),
+    [
+        ((0.0, None), (0.0, None), False),
+        ((0.0, 1.0), (1.0, None), True),
+        ((1.0, 2.0), (0.0, 1.0), True),
+        ((1.0, 2.0), (0.0, 1.25), False),
+        ((0.0, 5.0), (1.0, 2.0), False),
+        ((2.0, None), (3.0, 4.0), False),
+        ((4.0, None), (3.0, 4.0), True),
+    ],
+)
+def test_two_parts_of_a_file_are_apart_where_one_ends_before_the_other_begins(tmp_path, one, other, apart):
+    lines = []
+    for name, (begin, end), role in (("a", one, '"loops"'), ("b", other, '"validation"')):
+        until = "" if end is None else f'to = "{end} s"\n'
+        lines.append(
+            f'[recording.{name}]\nfile = "a.csv"\ninput = 1\noutput = 2\nrole = {role}\nfrom = "{begin} s"\n{until}'
+        )
+    with pytest.raises((RecordingsError, RecordingError)) as refused:
+        read_list(write_list(tmp_path, "".join(lines)))
+    assert ("takes samples for validation that [recording.a] fits" in str(refused.value)) is not apart
+    assert apart is ("there is no such file" in str(refused.value))
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (
+            'positions = [["0 mm", "1 mm"], ["2 mm", "3 mm"], ["4 mm", "5 mm"]]',
+            "positions has 3 places and there are 2 outputs, x, y; give one place for each, in their order.",
+        ),
+        (
+            "signs = [[1], [-1], [0]]",
+            "signs has rows of 1, 1, 1 items and there are 2 outputs and 2 inputs; give a row for each output, with an "
+            "item for each input.",
+        ),
+        (
+            "signs = [[1, 0], [-1]]",
+            "signs has rows of 2, 1 items and there are 2 outputs and 2 inputs; give a row for each output, with an "
+            "item for each input.",
+        ),
+    ],
+)
+def test_places_and_signs_of_two_axes_are_counted_in_all_words(tmp_path, line, words):
+    write_csv(tmp_path / "a.csv", "t,ux,uy,x,y")
+    channels = 'input = ["ux", "uy"]\noutput = ["x", "y"]\naccept = ["drift", "lead"]'
+    text = f'{line}\n{channels}\n[recording.a]\nfile = "a.csv"\n'
+    assert refusal(tmp_path, text) == f"{tmp_path / 'list.toml'}: {words}"

@@ -7,6 +7,7 @@ import truths
 from microrad.lab.identify import fit_prandtl_ishlinskii, identify, predict, records
 from microrad.lab.identify.records import (
     IdentificationError,
+    SiRecord,
     Units,
     centred,
     fastest_rate,
@@ -305,3 +306,58 @@ def test_rates_over_two_records_are_the_slowest_and_the_fastest_of_either():
     assert loop_rates(both) == pytest.approx(peaks, rel=0.01)
     assert fastest_rate(both) == fastest_rate(both[::-1]) == pytest.approx(peaks[1], rel=0.01)
     assert not records.one_rate_only(both) and records.one_rate_only(both[:1])
+
+
+@pytest.mark.parametrize(
+    ("second", "line", "steps"),
+    [(0.0, 20, 20), (0.04, 20, 20), (0.06, 20, 2), (0.06, 8, 5), (-0.06, 8, 5), (0.06, 50, 1)],
+)
+def test_a_rate_is_smoothed_over_a_hundredth_of_the_period_of_the_highest_strong_line(second, line, steps):
+    """Two periods of a sine in 4000 samples of 0.25 s, and a line of more or less than a twentieth of it."""
+    turn = 2 * np.pi * np.arange(4000) / 4000
+    drive = 7.0 + 3.0 * np.sin(2 * turn) + 3.0 * second * np.sin(line * turn)
+    found = smoothed_rate(drive, 0.25)
+    assert found.size == 4000 - steps
+    inner = slice(1, 4000 - steps - 1)
+    np.testing.assert_allclose(found[inner], (drive[steps:] - drive[:-steps])[inner] / (0.25 * steps), atol=3e-3)
+
+
+def test_a_record_of_every_third_sample_keeps_its_name_and_begins_behind_its_start():
+    made = SiRecord("r", "s", np.arange(20.0), 2.0 * np.arange(20.0), 0.5, 7)
+    third = made.every(3)
+    assert third.drive_v.tolist() == [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0]
+    assert third.output_rad.tolist() == [0.0, 6.0, 12.0, 18.0, 24.0, 30.0, 36.0]
+    assert (third.name, third.sha256, third.step_s, third.start, third.used) == ("r", "s", 1.5, 3, 4)
+    assert (made.every(7).start, made.every(8).start, made.every(1).start, made.used) == (1, 1, 7, 13)
+    third.drive_v[0] = 5.0
+    assert made.drive_v[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("drive", "turns"),
+    [
+        ([0, 2, 4, 6, 8, 6, 4, 2, 0, 2, 4, 6, 8], [4, 8]),
+        ([0, 2, 4, 6, 8, 8, 8, 6, 4, 2], [5]),
+        ([0, 2, 4, 9, 4, 6, 8, 10, 12], []),
+        ([8, 6, 4, 2, 0, 2, 4], [4]),
+        ([1, 1, 1, 1, 1], []),
+        ([0, 2, 4, 4, 3.9, 3.9, 4, 6, 8, 10], []),
+        ([0, 2, 4, 4, 3.4, 3.4, 4, 6, 8, 10], [2, 4]),
+    ],
+)
+def test_a_drive_reverses_where_it_goes_on_by_more_than_a_twentieth_of_its_range(drive, turns):
+    assert records.turning_points(np.array(drive, dtype=float)).tolist() == turns
+
+
+@pytest.mark.parametrize(
+    ("drive", "first"),
+    [
+        ([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0], 10),
+        ([0, 10, 5, 0, 10, 5, 0, 10, 5, 0], 2),
+        ([5, 0, 9.5, 10, 0, 10, 0, 10, 0, 10], 3),
+        ([5, 0, 9.4, 10, 0, 10, 0, 10, 0, 10], 4),
+        ([3, 3, 3, 3], 1),
+    ],
+)
+def test_a_record_is_judged_behind_where_its_drive_has_swept_95_per_cent_or_its_middle(drive, first):
+    assert records.transient(np.array(drive, dtype=float)) == first

@@ -496,3 +496,80 @@ def test_a_band_of_periodic_records_has_its_lines_of_everything():
     assert told(measure_frequency_response, [*records, drawn(64, 2, 1, 4)]) == (
         "some recordings state their period and others do not; measure each kind by itself, or state it for all."
     )
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "bands", "message"),
+    [
+        (100.0, 10.0, 9, "the band 100 to 10 Hz is empty; give a lower and a higher frequency."),
+        (50.0, 50.0, 9, "the band 50 to 50 Hz is empty; give a lower and a higher frequency."),
+        (0.0, 50.0, 9, "the band 0 to 50 Hz is empty; give a lower and a higher frequency."),
+        (np.nan, 50.0, 9, "the band nan to 50 Hz is empty; give a lower and a higher frequency."),
+        (
+            10.0,
+            12.5,
+            1,
+            "the record is too short for the band 10 to 12.5 Hz: it resolves 0.5 Hz, which leaves fewer than 8 lines; "
+            "record longer.",
+        ),
+    ],
+)
+def test_a_band_that_holds_no_lines_is_told_in_full(low, high, bands, message):
+    assert told(response._band_edges, 0.5 * np.arange(401), low, high, bands, 8) == message
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "bands", "edges"),
+    [
+        (10.0, 14.0, 1, "20-28"),
+        (10.0, 40.0, 2, "20-40 40-80"),
+        (10.0, 40.0, 4, "20-28 28-40 40-57 57-80"),
+        (1.0, 16.0, 4, "2-16 16-32"),
+        (100.0, 900.0, 2, "200-400"),
+        (0.1, 8.0, 3, "1-16"),
+    ],
+)
+def test_bands_are_logarithmic_within_the_lines_that_there_are(low, high, bands, edges):
+    found = response._band_edges(0.5 * np.arange(401), low, high, bands, 8)
+    assert " ".join(f"{begin}-{end}" for begin, end in found) == edges
+
+
+@pytest.mark.parametrize(
+    ("records", "words", "message"),
+    [
+        (lambda: [], {}, "no recording was given; name at least one."),
+        (
+            lambda: [drawn(n, 1, 1, n, name=str(n)) for n in (300, 40, 300)],
+            {},
+            "the records have [40, 300] samples; cut them to one length.",
+        ),
+        (
+            lambda: [drawn(300, k, 1, k, name=f"r{k}") for k in (2, 1)],
+            {},
+            "r1: 1 inputs and 1 outputs, where r2 has 2 and 1; choose the same channels in each record.",
+        ),
+        (
+            lambda: [replace(drawn(300, 1, 1, 1), drive=np.full((300, 1), 3.0))],
+            {},
+            "no drive changes in any record, so there is no response; excite the mirror.",
+        ),
+    ],
+)
+def test_records_without_a_period_that_give_no_response_are_told_in_full(records, words, message):
+    assert told(response_from_records, records(), **words) == message
+    assert told(measure_frequency_response, records(), **words) == message
+
+
+@pytest.mark.parametrize(("noise", "spare"), [(None, True), (4.0, False), (4.0, True), (36.0, True)])
+def test_standard_errors_are_split_where_there_is_something_to_split(noise, spare):
+    """Variances of two outputs at one line, spread over three drives; noise beyond the whole leaves no distortion."""
+    total, spread = np.array([[9.0, 25.0]]), np.array([[[1.0, 4.0, 0.25]]])
+    given = None if noise is None else np.full((1, 2), noise)
+    errors, noisy, distortion = response._standard_errors(total, given, spread, spare)
+    np.testing.assert_allclose(errors, [[[3.0, 6.0, 1.5], [5.0, 10.0, 2.5]]])
+    assert (noisy is None, distortion is None) == (noise is None, noise is None or not spare)
+    if noise:
+        np.testing.assert_allclose(noisy, np.sqrt(noise) * np.array([[[1.0, 2.0, 0.5]] * 2]))
+    if distortion is not None:
+        left = np.sqrt(np.maximum(np.array([9.0, 25.0]) - noise, 0.0))
+        np.testing.assert_allclose(distortion, left[None, :, None] * [1.0, 2.0, 0.5], atol=1e-12)

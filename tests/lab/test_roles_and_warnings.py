@@ -542,3 +542,85 @@ def test_a_mirror_that_first_moves_the_wrong_way_is_told_in_full_with_the_slope_
     plays = with_values(PrandtlIshlinskiiFit, sign=-1)
     assert warnings.fit_warnings(plays) == [warnings._FLIPPED]
     assert warnings.fit_warnings(with_values(PrandtlIshlinskiiFit, sign=1)) == []
+
+
+@pytest.mark.parametrize(
+    ("lines", "bands"),
+    [
+        ({100: 1.0}, [19, 20]),
+        ({100: 1.0, 300: 0.0295}, [19, 20, 24]),
+        ({100: 1.0, 300: 0.028}, [19, 20]),
+        ({10: 1.0, 13: 0.5}, [9, 10, 11]),
+        ({2: 1.0}, [0, 3, 4]),
+        ({795: 3.0, 1000: 3.0}, [28, 29, 30]),
+    ],
+)
+def test_tenths_of_a_decade_are_filled_by_lines_of_a_thousandth_of_the_largest(lines, bands):
+    """A window spreads a line to its neighbours on both sides."""
+    turn = 2 * np.pi * np.arange(8000) / 8000
+    drive = 5.0 + sum(size * np.sin(k * turn) for k, size in lines.items())
+    assert np.flatnonzero(selection_roles._filled(recording(drive))).tolist() == bands
+
+
+@pytest.mark.parametrize(
+    ("levels", "samples", "wide"), [(20, 46, True), (20, 49, False), (21, 48, True), (19, 52, False)]
+)
+def test_a_drive_that_rests_on_twenty_levels_half_of_the_time_is_not_broadband(levels, samples, wide):
+    """A thousand samples of noise, about one in each of the levels that are told apart."""
+    rests = np.repeat(np.arange(levels) * 0.04 - 0.41, samples)
+    drive = np.concatenate([np.linspace(-1.0, 1.0, 1000), rests])
+    assert is_broadband(recording(philox(1).permutation(drive))) is wide
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "rate", "words"),
+    [
+        (-0.00004, 10.0, 314.159, ("0 V to 10 V", "314.2 V/s", "10 Hz")),
+        (-1.23456, 9.87654, 12345.678, ("-1.23 V to 9.88 V", "12350 V/s", "353.7 Hz")),
+        (100.0004, 100.9996, 2.0, ("100 V to 101 V", "2 V/s", "0.6371 Hz")),
+        (100.4, 223.4, 20.0, ("100.4 V to 223.4 V", "20 V/s", "0.05176 Hz")),
+        (0.0, 12_345.6, 1e6, ("0 V to 12346 V", "1000000 V/s", "25.78 Hz")),
+    ],
+)
+def test_a_range_is_told_to_a_thousandth_of_its_width_and_a_rate_in_four_digits(low, high, rate, words):
+    valid, fast = warnings.range_warnings((low, high), rate)
+    assert valid == f"Valid for drives from {words[0]}; outside that range the model is an extrapolation."
+    assert fast == (
+        f"Not valid above {words[1]}, the fastest rate of the recordings: a sine over the whole drive range reaches it "
+        f"at {words[2]}."
+    )
+
+
+@pytest.mark.parametrize(
+    ("lost", "told"),
+    [
+        ((0.0, 0.0), None),
+        ((-0.019, 10.019), None),
+        ((-0.3, 5.0), 1),
+        ((-0.21, 10.21), 2),
+        ((10.19, -0.19), None),
+    ],
+)
+def test_a_held_out_sample_beyond_a_fiftieth_of_the_fitted_range_is_counted(lost, told):
+    drive = np.concatenate([[-7.0, 20.0], np.linspace(0, 10, 48), lost])
+    seen = Prediction(drive, drive, 1, 2, 0)
+    found = warnings.held_out_warnings([recording(1e3 * drive)], Units("mV", "urad"), (0.0, 10.0), [seen])
+    samples = f"{told} held-out samples lie outside the fitted drive range; the held-out residual judges them too."
+    assert found == ([] if told is None else [samples])
+
+
+@pytest.mark.parametrize(
+    ("values", "kept"),
+    [
+        ((1999, 800), (1600, 800)),
+        ((1600, 800), (1600, 800)),
+        ((1599, 800), (1599, None)),
+        ((4000, 800), (4000, 800)),
+        ((2500, 800), (2400, 800)),
+        ((2500, None), (2500, None)),
+    ],
+)
+def test_of_a_periodic_record_whole_periods_are_kept_where_there_are_two(values, kept):
+    samples, period = values
+    cut = whole_periods(recording(np.arange(float(samples)), period=period))
+    assert (cut.samples, cut.output.shape[0], cut.period_samples) == (kept[0], kept[0], kept[1])

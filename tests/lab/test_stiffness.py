@@ -1385,3 +1385,124 @@ def test_the_power_that_no_linear_model_follows_is_that_of_each_class_and_the_no
     expected = np.repeat(distortion, 3) + noise
     np.testing.assert_allclose(_expected_squares(records, classes, 0), expected, rtol=1e-9)
     assert distortion[1] > distortion[0] >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("reach", "largest", "times"), [(2.0, 5.0, 2.5), (2.0, 2.0, None), (2.0, 1.5, None), (np.inf, 9.0, None)]
+)
+def test_an_operator_goes_on_beyond_its_reach_alone(reach, largest, times):
+    play = PrandtlIshlinskii((0.0, 0.5), (1.0, -0.25), polynomial_rad=(1.0, -2.0, 3.0), reach_v=reach)
+    found = fit_of._further(play, largest)
+    if times is None:
+        assert found is play
+    else:
+        bent = (times**2, -2 * times**2, 3 * times**3)
+        assert found == replace(play, reach_v=largest, polynomial_rad=pytest.approx(bent))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "amplitudes", "classes"),
+    [
+        ([2.0, 1.0, 2.1, 1.2, 5.0], [0.5, 0.6, 1.025, 2.5], [2, 0, 2, 1, 3]),
+        ([1.0, 1.09, 1.18, 1.29], [0.57], [0, 0, 0, 0]),
+        ([3.0, 1.0], [0.5, 1.5], [1, 0]),
+        ([4.0], [2.0], [0]),
+        ([1.0, 1.11, 1.0], [0.5, 0.555], [0, 1, 0]),
+    ],
+)
+def test_amplitudes_that_are_within_a_tenth_of_the_next_are_one_class(sizes, amplitudes, classes):
+    """A drive of 0 and of its size has half of it as its rms about the mean."""
+    records = [SimpleNamespace(path=str(s), drive=np.array([[0.0], [s]])) for s in sizes]
+    found, own = amplitude_classes(records)
+    assert found == pytest.approx(amplitudes) and own == tuple(classes)
+    still = SimpleNamespace(path="still", drive=np.full((2, 1), 7.0))
+    with pytest.raises(IdentificationError) as refused:
+        amplitude_classes([*records, still])
+    assert str(refused.value) == "still: the drive does not change; excite the mirror."
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "classes", "middle"),
+    [
+        ((1.0, 3.0, 10.0), (0, 0, 1, 2, 2, 2), 1),
+        ((1.0, 3.0, 10.0), (0, 1, 2), 1),
+        ((1.0, 3.0, 10.0), (0, 1, 2, 2, 2, 2), 2),
+        ((1.0, 3.0, 10.0), (0, 0, 0, 0, 2), 0),
+        ((1.0, 4.0), (0, 1), 0),
+        ((1.0, 4.0), (0, 1, 1), 1),
+    ],
+)
+def test_the_middle_amplitude_is_next_to_the_geometric_mean_of_all_records(amplitudes, classes, middle):
+    assert fit_of._middle(amplitudes, classes) == middle
+
+
+@pytest.mark.parametrize(
+    ("drives", "classes", "few"),
+    [
+        ([(1, 0), (0, 1), (1, 1), (2, 0), (1, 0), (0, 0)], (0, 0, 0, 1, 0, 1), [0, 1, 2, 3, 5]),
+        ([(1, 1), (2, 3), (1, 1)], (0, 0, 1), [0, 2]),
+        ([(0, 2), (2, 0), (0, 3)], (1, 1, 1), [0, 1]),
+    ],
+)
+def test_one_record_of_each_amplitude_and_set_of_actuators_comes_first(drives, classes, few):
+    records = [SimpleNamespace(drive=np.array([[0.0, 0.0], each])) for each in drives]
+    assert fit_of._few(records, classes) == few
+
+
+@pytest.mark.parametrize(
+    ("costs", "ends"),
+    [
+        ([3.9] * 7 + [3.895], []),
+        ([3.9] * 8 + [3.895, 3.0], [9]),
+        ([4.0 * 0.9**k for k in range(1, 12)], []),
+        ([4.0 * 0.999**k for k in range(1, 12)], [8, 9, 10, 11]),
+        ([3.95] + [3.92] * 8, [9]),
+    ],
+)
+def test_a_search_is_told_by_its_error_and_ends_where_eight_steps_gain_less_than_a_hundredth(costs, ends):
+    told = []
+    own = fit_of._Told(lambda *args: told.append(args), 20, 0.01)
+    own.begin(3, 4.0)
+    ended = [k for k, cost in enumerate(costs, 1) if own(k, np.zeros(1), cost)]
+    assert ended == ends
+    assert told == [(3 + k, 20, f"error {cost**0.5:.4f}") for k, cost in enumerate(costs, 1)]
+    assert own.costs == [2.0, *(pytest.approx(cost**0.5) for cost in costs)]
+    own.begin(11, 2.25)
+    assert (own.before, own.costs) == (11, [1.5])
+
+
+def test_numbers_are_named_in_the_order_of_their_vector(numbers):
+    """A pair and two real poles of four states, two drives, two outputs, four operators of three plays."""
+    names = dict(zip(numbers.names, numbers.vector(), strict=True))
+    assert list(names)[:4] == [*(f"modes.decay.{k}" for k in (1, 2, 3)), "modes.frequency.1"]
+    assert list(names)[-1] == "recording.delay"
+    for name in ("B", "E", "F", "G", "C", "D", "K"):
+        for (i, j), value in np.ndenumerate(getattr(numbers, name)):
+            assert names.pop(f"matrices.{name}.{i + 1}.{j + 1}") == value
+    for name in ("weights", "polynomial"):
+        for (i, j), value in np.ndenumerate(getattr(numbers, name)):
+            assert names.pop(f"hysteresis.{i + 1}.{name}.{j + 1}") == value
+    assert list(names.values()) == [-30.0, -50.0, -100.0, 600.0, 3e-4]
+    assert numbers.rows == [0, 2, 3] and numbers.poles.tolist() == [-30 + 600j, -50.0, -100.0]
+    again = numbers.at(2.0 * numbers.vector())
+    np.testing.assert_array_equal(again.vector(), 2.0 * numbers.vector())
+    assert again.thresholds is numbers.thresholds and again.delay_s == 6e-4
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "rate_hz", "told"),
+    [
+        (2, 3, 400.0, "2 inputs and 3 outputs at 400 Hz"),
+        (3, 2, 400.0, "3 inputs and 2 outputs at 400 Hz"),
+        (2, 1, 400.5, "2 inputs and 1 outputs at 400.5 Hz"),
+        (1, 1, 400.0, "1 inputs and 1 outputs at 400 Hz"),
+    ],
+)
+def test_a_record_of_other_channels_or_rate_is_not_predicted(inputs, outputs, rate_hz, told):
+    """The model has two actuators and one output."""
+    fit = SimpleNamespace(rate_hz=400.0, mirror=SimpleNamespace(actuators=2, axes=1))
+    names = tuple("abc")
+    record = Recording("r", "", np.ones((4, inputs)), np.ones((4, outputs)), rate_hz, names[:inputs], names[:outputs])
+    with pytest.raises(IdentificationError) as refused:
+        predicted_error(fit, record)
+    assert str(refused.value) == (f"r: {told}, where the model has 2 and 1 at 400 Hz; give a record like those fitted.")

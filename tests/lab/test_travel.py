@@ -86,3 +86,28 @@ def test_a_travel_beyond_a_quarter_turn_is_told_in_full(unit, size, options, wor
         f"loop.csv: the output 'output 1' moves by {words}, and no mirror turns by more than 1.571 rad (a quarter "
         f"turn); correct the unit of the output (--output-unit, output_unit){over}."
     )
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "options", "fits"),
+    [
+        ("rad", 1.57, {}, True),
+        ("rad", 1.58, {}, False),
+        ("mrad", 1570.0, {}, True),
+        ("urad", 1.58e6, {}, False),
+        ("um", 31_400.0, {"lever_arm_m": 0.02}, True),
+        ("um", 31_600.0, {"lever_arm_m": 0.02}, False),
+        ("mm", 47.0, {"positions_m": [(0.0, 0.0), (0.018, 0.024), (0.01, 0.0)]}, True),
+        ("mm", 47.4, {"positions_m": [(0.0, 0.0), (0.018, 0.024), (0.01, 0.0)]}, False),
+        ("mm", 47.4, {"positions_m": [(0.0, 0.0), (0.018, 0.024)], "lever_arm_m": 0.031}, True),
+        ("m", 1e6, {"positions_m": [(0.0, 0.0)]}, True),
+        ("furlong", 1e6, {"lever_arm_m": 0.1}, True),
+    ],
+)
+def test_an_output_turns_by_a_quarter_at_most_in_each_unit(unit, size, options, fits):
+    moved = Recording("a", "a", WAVE[:, None], size * (WAVE[:, None] / np.ptp(WAVE)), 1.0, ("u",), ("y",))
+    if fits:
+        check_travel([moved], unit, **options)
+    else:
+        with pytest.raises(IdentificationError, match=r"^a: the output 'y' moves by "):
+            check_travel([moved], unit, **options)

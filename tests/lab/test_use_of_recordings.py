@@ -8,7 +8,7 @@ import pytest
 
 import truths
 from microrad.lab.identify import IdentificationError, identify
-from microrad.lab.identify.selection.predictions import Prediction, evidence
+from microrad.lab.identify.selection.predictions import Evidence, Prediction, evidence
 from microrad.lab.identify.selection.roles import roles
 from microrad.lab.identify.selection.splits import split_points, split_warnings
 from microrad.lab.identify.selection.warnings import use_warnings
@@ -259,8 +259,8 @@ def test_a_share_that_leaves_too_little_of_the_second_record_is_told_in_full():
     with pytest.raises(IdentificationError) as caught:
         split_points([long], 1.25, validated=True)
     assert str(caught.value) == (
-        "--hold-out (hold_out) is 1.25; give the share of each recording kept for the check, between 0 and 1, e.g. "
-        "0.5, or 0 with recordings for validation."
+        "--hold-out (hold_out) is 1.25; give the share of each recording kept for the check, between 0 and 1, "
+        "e.g. 0.5, or 0 with recordings for validation."
     )
     assert split_points([long, replace(short, path="other")], 0.4, validated=False) == [600, 200]
 
@@ -288,3 +288,26 @@ def test_the_worst_recording_is_the_one_of_the_largest_rms_from_where_it_counts(
 
 
 OF_RATES = ("a", 100.0), ("b", 10.0), ("c", 50.0), ("d", 200.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        ((2.0,), "2 s of 1 recording, r0 (2 s)"),
+        ((2.0, 0.25), "2.25 s of 2 recordings, r0 (2 s) and r1 (0.25 s)"),
+        ((1.0, 2.0, 4.0), "7 s of 3 recordings, r0 (1 s) and r1 (2 s) and r2 (4 s)"),
+        ((1.0, 2.0, 4.0, 8.0), "15 s of 4 recordings"),
+    ],
+)
+def test_what_is_judged_is_named_up_to_three_recordings(seconds, text):
+    assert Evidence(tuple((f"r{k}", each) for k, each in enumerate(seconds)), "r0", 1.0, 2.0).text == text
+
+
+@pytest.mark.parametrize(("hold_out", "validated"), [(1.5, False), (0.0, False), (-0.25, True)])
+def test_a_share_that_is_none_is_told_in_all_words(hold_out, validated):
+    with pytest.raises(IdentificationError) as refused:
+        split_points([of_drive(np.sin(np.arange(1000)))], hold_out, validated=validated)
+    assert str(refused.value) == (
+        f"--hold-out (hold_out) is {hold_out}; give the share of each recording kept for the check, between 0 and 1, "
+        "e.g. 0.5, or 0 with recordings for validation."
+    )

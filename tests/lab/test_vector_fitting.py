@@ -387,3 +387,81 @@ def test_functions_of_a_step_are_those_of_their_integrals(pole):
         weights @ ((1 - x) * x * grown),
     ]
     np.testing.assert_allclose([v[0] for v in modal._phi(np.array([pole], dtype=complex))], expected, rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("freq", "order", "poles"),
+    [
+        ([0.0, 2.0, 10.0, 30.0, 80.0], 1, [-10.0]),
+        ([0.0, 2.0, 10.0, 30.0, 80.0], 2, [10.0 * (-0.01 + 1j)]),
+        ([80.0, 2.0, 10.0, 0.0, 30.0], 3, [-10.0, 10.0 * (-0.01 + 1j)]),
+        ([0.0, 2.0, 10.0, 30.0, 80.0], 5, [-10.0, 2.0 * (-0.01 + 1j), 30.0 * (-0.01 + 1j)]),
+        ([1.0, 2.0, 4.0, 8.0], 7, [-3.0, 1.5 * (-0.01 + 1j), 3.0 * (-0.01 + 1j), 6.0 * (-0.01 + 1j)]),
+    ],
+)
+def test_poles_begin_at_the_middle_of_equal_parts_of_the_frequencies(freq, order, poles):
+    found = vector_fitting.starting_poles(np.array(freq), order) / (2 * np.pi)
+    upper = [p for p in poles if np.imag(p)]
+    np.testing.assert_allclose(found, [*(p for p in poles if not np.imag(p)), *upper, *np.conj(upper)], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "moved"),
+    [
+        ([-1, -5 + 30j], [-1, -5 + 30j], 0.0),
+        ([-40, -5 + 3j], [-50, -5 + 3j], 0.4),
+        ([-40, -5 + 3j], [-40, -4 + 3j], np.sqrt(34.0) / 4 - 1.25 + 0.25),
+        ([-2, -40], [-40, -4], 1.0),
+        ([-1, -2, -3 + 9j], [-1 + 1j, -3 + 9j], np.inf),
+        ([-40, -7 + 1j, -8 + 30j], [-44, -7 + 1j, -8 + 30j], 8 / 44),
+    ],
+)
+def test_real_poles_are_compared_with_real_ones_and_pairs_with_pairs(before, after, moved):
+    def whole(poles):
+        return np.array([q for p in poles for q in ((p, np.conj(p)) if np.imag(p) else (p,))], dtype=complex)
+
+    assert vector_fitting._moved_by(whole(before), whole(after)) == pytest.approx(moved, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("count", "order", "message"),
+    [
+        (5, 4, None),
+        (5, 5, "5 frequencies cannot fix 5 poles; give at least 6 frequencies or a lower order."),
+        (5, 9, "5 frequencies cannot fix 9 poles; give at least 10 frequencies or a lower order."),
+        (5, 0, "the order is 0; give at least one pole."),
+        (0, -3, "the order is -3; give at least one pole."),
+    ],
+)
+def test_an_order_needs_a_frequency_more(count, order, message):
+    if message:
+        assert told(vector_fitting.check_order, np.arange(count), order) == message
+    else:
+        assert vector_fitting.check_order(np.arange(count), order) is None
+
+
+@pytest.mark.parametrize(
+    ("hold", "rate_hz", "last", "message"),
+    [
+        ("band-limited", None, 1.0, None),
+        ("band-limited", 7.0, 1.0, None),
+        ("zero-order", 8.5, 1.0, None),
+        ("zero-order", None, 1.0, "a zero-order hold needs the sample rate; give rate_hz."),
+        ("first-order", None, 1.0, "a first-order hold needs the sample rate; give rate_hz."),
+        (
+            "first-order",
+            8.0,
+            1.0,
+            "the response reaches 4 Hz, half the sample rate of 8 Hz or more; leave that out.",
+        ),
+        ("band-limited", None, np.nan, "the response at 4 Hz is not finite; leave it out."),
+        ("zero-order", 8.0, np.inf, "the response at 4 Hz is not finite; leave it out."),
+    ],
+)
+def test_a_response_that_a_hold_cannot_have_is_told_in_full(hold, rate_hz, last, message):
+    freq, data = np.array([1.0, 2.5, 4.0]), np.ones((3, 2), dtype=complex)
+    data[2, 1] = last
+    if message:
+        assert told(vector_fitting._check, freq, 2, data, hold, rate_hz) == message
+    else:
+        assert vector_fitting._check(freq, 2, data, hold, rate_hz) is None

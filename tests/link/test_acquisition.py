@@ -3,17 +3,21 @@
 import itertools
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from microrad.link.acquisition import partner_search
 from microrad.link.acquisition.detection import detection_times
 from microrad.link.acquisition.scan import Detector, Search, Spiral
 from microrad.link.acquisition.sequence import (
     LOCKED,
     LOST,
     Chances,
+    Outcome,
+    SequenceRuns,
     Stage,
     Timing,
     answer_stages,
@@ -26,7 +30,7 @@ from microrad.link.acquisition.sequence import (
     simulate_log,
     solve_sequence,
 )
-from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
+from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined, merged
 from microrad.link.acquisition.trade import Beams, Receiver, wide_against_scan
 
 URAD = 1e-6
@@ -599,3 +603,172 @@ TIMES = TimeDistribution(np.array([1.5, 4.0, 7.25]), np.array([0.125, 0.25, 0.37
 )
 def test_times_chances_and_trades_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+TWO = TimeDistribution(np.array([1.0, 2.5]), np.array([0.3, 0.5]))
+CHAIN = (Stage("turn", 1.5, 0.9, 2.25), Stage("look", TWO, 0.7, 4.0, "turn"), Stage("lock", 0.5, 0.8, 0.75, "look"))
+PACE = Timing(4.1e7, 3.0, 0.07, 4, 1.3, 0.9, 0.2, 0.11, "own", "other")
+LUCK = Chances(0.91, 0.37, 0.83, 0.76, 0.68, 0.97)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [*(t := merged(np.array([3.0, 1.0, 1.0 + 5e-10, 2.0]), np.array([0.1, 0.2, 0.3, 0.0]))).time_s, *t.weight],
+     "1 3 0.5 0.1"),
+    (lambda: [*(t := merged(np.arange(9.0), np.arange(9.0), 3)).time_s, *t.weight],
+     "2.33333333 4.55555556 7.0952381 6 9 21"),
+    (lambda: [merged(np.zeros(3), np.zeros(3)).probability, merged(np.zeros(3), np.zeros(3)).time_s.size], "0 0"),
+    (lambda: [(t := TimeDistribution(np.array([1.0, 2.5, 7.0]), np.array([0.1, 0.25, 0.4]))).mean_s, t.std_s,
+            t.probability],
+     "4.7 2.5019992 0.75"),
+    (lambda: [TimeDistribution(np.array([1.0, 2.5, 7.0]), np.array([0.1, 0.25, 0.4])).quantile(p) for p in (0.05, 0.1,
+            0.11, 0.75)],
+     "1 1 2.5 7"),
+    (lambda: [TimeDistribution(np.array([1.0, 2.5]), np.array([0.1, 0.25])).cumulative(x) for x in (0.9, 1.0, 2.5, 2.5
+            - 1e-9, 9.0)],
+     "0 0.1 0.35 0.35 0.35"),
+    (lambda: [*(t := fixed_time(2.0, 0.6).followed_by(fixed_time(0.5, 0.25))).time_s, *t.weight], "2.5 0.15"),
+    (lambda: [*(t := joined([fixed_time(2.0, 0.6), fixed_time(0.5, 0.25), fixed_time(2.0, 0.1)])).time_s, *t.weight],
+     "0.5 2 0.25 0.7"),
+    (lambda: [*(t := TWO.shifted(1.5).scaled(0.5).given_success()).time_s, *t.weight], "2.5 4 0.375 0.625"),
+    (lambda: [*(t := TWO.followed_by(TWO.shifted(0.25))).time_s, *t.weight], "2.25 3.75 5.25 0.09 0.3 0.25"),
+    (lambda: [(s := Stage("a", TWO, 0.5)).longest_s, s.failure_s, *s.success_times.time_s, *s.success_times.weight],
+     "2.5 2.5 1 2.5 0.1875 0.3125"),
+    (lambda: [(s := Stage("a", 1.5, 0.5, 4.0)).longest_s, s.failure_s, *s.success_times.time_s,
+            *s.success_times.weight],
+     "1.5 4 1.5 0.5"),
+    (lambda: [*(o := solve_sequence(CHAIN, 3)).locked.time_s, *o.locked.weight],
+     "3 4.5 4.75 5.25 6.25 6.5 6.75 7 7.5 7.75 8 8.5 9 9.5 10 10.25 10.75 11 11.75 12.25 13.25 14 15.5 0.189 "
+     "0.315 0.0099225 0.0189 0.033075 0.00052093125 0.0315 0.00099225 0.00189 0.0275625 0.00260465625 0.0543375 "
+     "0.00315 0.00434109375 0.08780625 0.00535815 0.010206 0.00241171875 0.0178605 0.01701 0.01488375 0.0137781 "
+     "0.0229635"),
+    (lambda: [*(o := solve_sequence(CHAIN, 2)).lost.time_s, *o.lost.weight],
+     "4.5 5 5.5 6.5 7 7.25 7.75 8 8.75 10.25 11 0.01 0.002480625 0.004725 0.00826875 0.007875 0.014175 0.054 "
+     "0.006890625 0.0363825 0.0212625 0.0729"),
+    (lambda: [(o := solve_sequence(CHAIN, 4)).success_probability, o.mean_time_s, o.lost.probability],
+     "0.944733384 6.94852464 0.055266616"),
+    (lambda: [*(r := simulate(CHAIN, 2, 12, 5)).locked, *r.time_s],
+     "1 1 1 1 1 1 1 1 1 0 1 1 3 4.5 3 4.5 4.5 3 10 6.75 6.25 11 4.5 4.5"),
+    (lambda: [x.time_s for x in simulate_log(CHAIN, 3, 11)], "1.5 4 4.5"),
+    (lambda: [frame_detection_probability(*x) for x in ((0.0, 2.0), (7.0, 4.5), (1.0, -0.5))],
+     "0.0227501319 0.993790335 0.933192799"),
+    (lambda: [frames_detection_probability(0.3, n) for n in (1, 2, 7)], "0.3 0.51 0.9176457"),
+    (lambda: [x for s in scan_stages(PACE, TWO, 9.0) for x in (s.longest_s, s.success_probability, s.failure_s)],
+     "3 1 3 0.136761279 1 0.136761279 2.5 0.8 11.3367613"),
+    (lambda: [x for s in beacon_stages(PACE, LUCK) for x in (s.longest_s, s.success_probability, s.failure_s)],
+     "3 1 3 0.136761279 1 0.136761279 0.28 0.766648055 2.61676128"),
+    (lambda: [x for s in answer_stages(PACE, LUCK) for x in (s.longest_s, s.success_probability, s.failure_s)],
+     "1.3 1 1.3 0.136761279 1 0.136761279 0.9 0.6308 1.03676128 0.2 1 0.2 0.136761279 1 0.136761279 0.11 0.6596 "
+     "0.246761279 0.136761279 1 0.136761279 0.11 0.97 0.11"),
+    (lambda: Receiver(0.05, 2e-10, 0.03, 0.002).detection_time_s([1e-10, 2e-10, 9e-10]), "0.12 0.03 0.002"),
+    (lambda: Receiver(0.05, 2e-10, 0.03).detection_time_s([4e-9]), "7.5e-05"),
+    (lambda: Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.3).irradiance_w_m2([1e-5, 3e-5], [0.0, 2e-5]),
+     "5.96831037e-06 2.72627305e-07"),
+    (lambda: [Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.3).edge_irradiance_w_m2], "4.84406672e-07"),
+    (lambda: [(t := wide_against_scan(6e-5, 0.8, Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.3), Receiver(0.05, 2e-10,
+            0.03))).speed_rad_s, *t.scan_probability, *t.wide_time_s, *t.sigma_rad],
+     "10.4733432 0.797744158 0.00534811628 6e-05"),
+])  # fmt: skip
+def test_times_and_stages_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: "; ".join(f"{x.stage} > {x.to}: {x.cause}" for x in simulate_log(CHAIN, 3, 11)),
+     "turn > look: done; look > lock: done; lock > locked: done"),
+    (lambda: "; ".join(f"{x.stage} > {x.to}: {x.cause}" for x in simulate_log(CHAIN, 1, 3)),
+     "turn > lost: time-out, failure 1 of 1"),
+    (lambda: "; ".join(f"{x.stage} > {x.to}: {x.cause}" for x in simulate_log(CHAIN, 2, 29)),
+     "turn > look: done; look > turn: time-out, failure 1 of 2; turn > look: done; look > lock: done; lock > "
+     "locked: done"),
+    (lambda: "; ".join(f"{x.name} > {x.on_failure}" for x in paper_sequence(PACE, LUCK)),
+     "own points the beacon > ; beacon travels > ; other detects > own points the beacon; other turns and "
+     "answers > ; answer travels > ; own detects the answer > other turns and answers; own's mirror turns > ; "
+     "narrow beam travels > ; other locks > own detects the answer; other's beam travels > ; own locks > own "
+     "detects the answer"),
+    (lambda: "; ".join(f"{x.name} > {x.on_failure}" for x in scan_stages(PACE, TWO, 9.0)),
+     "own points the scan > ; beam travels > ; other detects > own points the scan"),
+])  # fmt: skip
+def test_stages_and_logs_name_each_step_and_where_it_leads(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: Stage("a", -1.0), 'the duration of the stage "a" is -1 s: it must be finite, at least 0 s'),
+    (lambda: Stage("a", 1.0, 0.0),
+     'the probability of success of the stage "a" is 0: it must be finite, above 0, at most 1'),
+    (lambda: Stage("a", 1.0, 1.5),
+     'the probability of success of the stage "a" is 1.5: it must be finite, above 0, at most 1'),
+    (lambda: Stage("a", 1.0, 1.0, -2.0), 'the time-out of the stage "a" is -2 s: it must be finite, at least 0 s'),
+    (lambda: Stage("a", TWO, 0.5, 2.4),
+     'the stage "a" lasts 2.5 s and its time-out is 2.4 s: the time-out must not be shorter'),
+    (lambda: Stage("a", math.inf), 'the duration of the stage "a" is inf s: it must be finite, at least 0 s'),
+    (lambda: solve_sequence((), 1), "the sequence has no stage: give at least one"),
+    (lambda: solve_sequence(CHAIN, 0), "the number of attempts is 0: it must be finite, at least 1"),
+    (lambda: solve_sequence((CHAIN[0], CHAIN[0]), 2),
+     "two stages have the same name among turn, turn: name each differently"),
+    (lambda: solve_sequence((replace(CHAIN[0], on_failure="lock"), *CHAIN[1:]), 2),
+     '"turn" goes back to "lock" on failure: it must be itself or an earlier stage, one of turn'),
+    (lambda: simulate(CHAIN, 2, 0, 1), "the number of runs is 0: it must be finite, at least 1"),
+    (lambda: simulate_log(CHAIN, 0, 1), "the number of attempts is 0: it must be finite, at least 1"),
+    (lambda: TWO.quantile(0.85),
+     "no time has the probability 0.85: it must lie above 0 and be at most 0.8, the probability of success"),
+    (lambda: TWO.quantile(-0.1),
+     "no time has the probability -0.1: it must lie above 0 and be at most 0.8, the probability of success"),
+    (lambda: TWO.scaled(0.0).mean_s,
+     "there is no time of success: its probability is 0; lengthen the time-out or the coverage"),
+    (lambda: fixed_time(-0.1), "a time is -100 ms: it must be finite, at least 0 s"),
+    (lambda: frame_detection_probability(-1.0, 2.0), "the signal-to-noise ratio is -1: it must be finite, at least 0"),
+    (lambda: frame_detection_probability(1.0, math.nan), "the threshold is nan times the noise: it must be finite"),
+    (lambda: frames_detection_probability(0.0, 2),
+     "the probability of detection in a frame is 0: it must be finite, above 0, at most 1"),
+    (lambda: frames_detection_probability(0.5, 0), "the number of frames is 0: it must be finite, at least 1"),
+    (lambda: replace(PACE, frames=0), "Timing.frames is 0: it must be finite, at least 1"),
+    (lambda: replace(PACE, range_m=0.0), "Timing.range_m is 0 m: it must be finite, above 0 m"),
+    (lambda: replace(PACE, lock_time_s=-0.1), "Timing.lock_time_s is -100 ms: it must be finite, at least 0 s"),
+    (lambda: replace(LUCK, lock=1.01), "Chances.lock is 1.01: it must be finite, above 0, at most 1"),
+    (lambda: Receiver(0.0, 1e-9, 0.1), "Receiver.aperture_area_m2 is 0 m^2: it must be finite, above 0 m^2"),
+    (lambda: Receiver(0.1, 1e-9, 0.1, -1.0), "Receiver.shortest_s is -1 s: it must be finite, at least 0 s"),
+    (lambda: Beams(0.0, 4e7, 2e-5, 1.5e-5, 0.3), "Beams.power_w is 0 W: it must be finite, above 0 W"),
+    (lambda: Beams(1.0, 4e7, 1.6, 1.5e-5, 0.3),
+     "Beams.narrow_half_angle_rad is 1.6 rad: it must be finite, above 0 and below 1.571 rad; an angle from the "
+     "line of sight is meant"),
+    (lambda: wide_against_scan(6e-5, 0.8, Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.0), Receiver(0.05, 2e-10, 0.03)),
+     "the overlap is 0: it must be above 0, or a target between two tracks is seen for no time"),
+    (lambda: wide_against_scan(6e-5, 1.0, Beams(1.5, 4e7, 2e-5, 1.5e-5, 0.2), Receiver(0.05, 2e-10, 0.03)),
+     "Search.coverage is 1: it must be finite, above 0 and below 1; Gaussian errors have no edge"),
+])  # fmt: skip
+def test_a_refusal_of_an_acquisition_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected
+
+
+LOOKS = SimpleNamespace(measurement_s=0.3, sensor=SimpleNamespace(rate_hz=40.0), detection_probability=0.87)
+FOUND = partner_search.Found(
+    "scan", CHAIN, Outcome(TWO, TWO), SequenceRuns(np.array([True, False, True]), np.array([1.0, 9.0, 2.5])), ()
+)
+
+
+def replace_in(table, **changes):
+    return SimpleNamespace(**{**vars(table), **changes})
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [partner_search._answer_detection(LOOKS, SimpleNamespace(signal_to_noise=x)) for x in (0.0, 1.3, 1.9)],
+     "2.86651572e-07 0.309711631 0.943151591"),
+    (lambda: [partner_search._answer_detection(replace_in(LOOKS, measurement_s=1e-3),
+            SimpleNamespace(signal_to_noise=4.6))],
+     "0.344578258"),
+    (lambda: [partner_search._answer_detection(LOOKS, None), partner_search._answer_detection(replace_in(LOOKS,
+            sensor=None), 1)],
+     "0.87 0.87"),
+    (lambda: [partner_search._possible(x) for x in (-1.0, 0.0, 1e-13, 0.3, 1.0 + 1e-9)], "1e-12 1e-12 1e-12 0.3 1"),
+    (lambda: [partner_search._coverage(partner_search._equal_axes(2e-6, 3e-6), 5e-6),
+            partner_search._coverage(partner_search._equal_axes(9.0, 0.0), 5e-6)],
+     "0.676335066 1e-12"),
+    (lambda: [(f := FOUND).early_s, f.simulated_probability, f.simulated_mean_s, f.possible], "2.5 0.666666667 1.75 1"),
+    (lambda: [(f := replace(FOUND, outcome=Outcome(TWO.scaled(1e-10), TWO))).early_s, f.possible], "nan 0"),
+    (lambda: [replace(FOUND, simulated=SequenceRuns(np.zeros(2, dtype=bool), np.ones(2))).simulated_mean_s], "nan"),
+])  # fmt: skip
+def test_chances_of_a_partner_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)

@@ -1,6 +1,7 @@
 """Scans by a narrow beam: geometry, crossings counted against the real path, gaps by vibration, time to detection."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -306,3 +307,116 @@ def test_the_limits_themselves_are_allowed():
     Spiral(SEARCH, SURE, 0.04)
     StepStare(SEARCH, SURE, LOOK_S, 0.0)
     Search(300e-6, 20e-6, 0.0, 0.999999)
+
+
+SOUGHT = Search(sigma_rad=31 * URAD, beam_radius_rad=13 * URAD, overlap=0.27, coverage=0.83)
+PATHS = (
+    Spiral(SOUGHT, Detector(2e-3, 0.7), 3.1e-3),
+    Raster(SOUGHT, Detector(2e-3, 0.7), 3.7e-3, 0.011),
+    StepStare(SOUGHT, Detector(2e-3, 0.7), 7e-3, 0.0015),
+)
+TARGETS = (np.array([3.0, -21.0, 47.0]) * URAD, np.array([-8.0, 30.0, 9.0]) * URAD)
+SHAKE = Vibration(2.3 * URAD, 0.004)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [x for t in (0.0, 0.03, 0.4) for x in PATHS[0].beam_at(np.array(t), np.array(0.0))],
+     "0 0 1.67780058e-07 2.37030243e-05 -8.04269382e-05 -3.19842843e-05"),
+    (lambda: [*PATHS[0].time_at(np.array([-1e-5, 3e-5])), *PATHS[0].track_radius(np.array([0.0, 0.2])),
+            PATHS[0].duration_s],
+     "0 0.0480545462 0 6.12024788e-05 0.181843798"),
+    (lambda: [x for t in (-0.1, 0.03, 0.9, 99.0) for x in PATHS[1].beam_at(np.array(t), np.array(t))],
+     "-5.83583846e-05 -5.694e-05 5.26416154e-05 -5.694e-05 5.83583846e-05 5.694e-05 5.83583846e-05 5.694e-05"),
+    (lambda: [PATHS[1].rows, PATHS[1].row_time_s, PATHS[1].duration_s, *PATHS[1].row_rad[:3]],
+     "7 0.0315450727 0.286815509 -5.694e-05 -3.796e-05 -1.898e-05"),
+    (lambda: [x for t in (-0.1, 0.0149, 0.4, 99.0) for x in PATHS[2].beam_at(np.array(0.0), np.array(t))],
+     "0 0 -9.49e-06 -1.64371622e-05 -5.694e-05 0 -5.694e-05 0"),
+    (lambda: [PATHS[2].dwells, PATHS[2].duration_s, *PATHS[2].basis_rad.ravel()],
+     "37 0.313 1.898e-05 0 9.49e-06 1.64371622e-05"),
+    (lambda: PATHS[2].order(np.array([[0, 0], [1, 0], [0, 1], [-1, 1], [2, -1], [-3, 2], [9, 9]])), "0 3 4 5 11 34 37"),
+    (lambda: [len(PATHS[2].near(x * URAD)) for x in (0.0, 11.0, 23.0, 50.0)], "7 7 19 55"),
+    (lambda: [x for each in PATHS[0].windows(*TARGETS, 17 * URAD) for x in each[1]],
+     "0.00123276167 0.0302063574 0.0976492619 0.181843798 0.00374482685 0.0399536322 0.114631746 0.181843798"),
+    (lambda: [x for each in PATHS[0].windows(*TARGETS, 17 * URAD) for x in each[2]],
+     "0.0177274278 0.073893421 0.168528723 0.181843798 0.0232825253 0.0848412309 0.181843798 0.181843798"),
+    (lambda: [x for each in PATHS[1].windows(*TARGETS, 17 * URAD) for x in each[1]],
+     "0.175682557 0.229578981 0.260772703 0.184871746 0.23876817 0.269961892"),
+    (lambda: [x for each in PATHS[1].windows(*TARGETS, 17 * URAD) for x in each[2]],
+     "0.10897079 0.127635218 0.194060935 0.116635218 0.135299646 0.201725364"),
+    (lambda: [x for each in PATHS[2].windows(*TARGETS, 17 * URAD) for x in each[1][:6]],
+     "0.034 0.0425 0.051 0.1275 0.136 0.1445 0.041 0.0495 0.058 0.1345 0.143 0.1515"),
+    (lambda: [x for each in PATHS[2].windows(*TARGETS, 17 * URAD) for x in each[2][:6]],
+     "0.0255 0.102 0.1105 0.119 0.221 0.2295 0.0325 0.109 0.1175 0.126 0.228 0.2365"),
+    (lambda: [PATHS[0].search.radius_rad, PATHS[0].search.pitch_rad, highest_speed(PATHS[0].search, 3e-3)],
+     "5.83583846e-05 1.898e-05 0.00592320859"),
+    (lambda: Detector(2e-3, 0.35).looks(np.array([0.0, 1.99e-3, 2e-3, 7e-3])), "0 0 1 3"),
+    (lambda: Detector(2e-3, 0.35).crossing_probability(np.array([1.9e-3, 4e-3, 7e-3])), "0 0.5775 0.725375"),
+    (lambda: [gap_probability(each, 2.3 * URAD) for each in PATHS], "0.0181668703 0.0350546197 0.014788162"),
+    (lambda: [gap_probability(each) for each in PATHS], "0.0120676943 0.0241172312 0.0116995284"),
+    (lambda: [(t := detection_times(PATHS[0])).probability, t.mean_s, t.std_s, t.quantile(0.25)],
+     "0.837769823 0.0600537469 0.0490160227 0.0232188248"),
+    (lambda: [(t := detection_times(PATHS[0], 2.3 * URAD)).probability, t.mean_s, t.quantile(0.25)],
+     "0.832348941 0.0598637812 0.0231300339"),
+    (lambda: [(r := simulate_scan(PATHS[0], 40, 8, SHAKE, 24)).detected.sum(), r.time_s.sum(), *r.target_y_rad[:2]],
+     "34 3.50372642 -1.72823672e-05 -8.30700778e-06"),
+    (lambda: [(r := simulate_scan(PATHS[0], 15, 9)).detected.sum(), r.time_s.sum(), r.target_x_rad[3]],
+     "13 0.980269685 4.50062985e-05"),
+    (lambda: [(t := detection_times(PATHS[1])).probability, t.mean_s, t.std_s, t.quantile(0.25)],
+     "0.892709093 0.138685381 0.0646903427 0.0991375607"),
+    (lambda: [(t := detection_times(PATHS[1], 2.3 * URAD)).probability, t.mean_s, t.quantile(0.25)],
+     "0.882688557 0.138403386 0.0996304525"),
+    (lambda: [(r := simulate_scan(PATHS[1], 40, 8, SHAKE, 24)).detected.sum(), r.time_s.sum(), *r.target_y_rad[:2]],
+     "36 6.06093549 -1.72823672e-05 -8.30700778e-06"),
+    (lambda: [(r := simulate_scan(PATHS[1], 15, 9)).detected.sum(), r.time_s.sum(), r.target_x_rad[3]],
+     "14 1.98463852 4.50062985e-05"),
+    (lambda: [(t := detection_times(PATHS[2])).probability, t.mean_s, t.std_s, t.quantile(0.25)],
+     "0.868888233 0.101728922 0.0858538327 0.0366906475"),
+    (lambda: [(t := detection_times(PATHS[2], 2.3 * URAD)).probability, t.mean_s, t.quantile(0.25)],
+     "0.864848477 0.101921451 0.0366906475"),
+    (lambda: [(r := simulate_scan(PATHS[2], 40, 8, SHAKE, 24)).detected.sum(), r.time_s.sum(), *r.target_y_rad[:2]],
+     "36 5.61552174 -1.72823672e-05 -8.30700778e-06"),
+    (lambda: [(r := simulate_scan(PATHS[2], 15, 9)).detected.sum(), r.time_s.sum(), r.target_x_rad[3]],
+     "14 1.3853622 4.50062985e-05"),
+])  # fmt: skip
+def test_scans_of_numbers_unlike_each_other_keep_their_paths(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: gap_probability(PATHS[0], -1e-6), "the vibration's rms is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: detection_times(PATHS[2], math.inf), "the vibration's rms is inf rad: it must be finite, at least 0 rad"),
+    (lambda: gap_probability(PATHS[1], 1e-31),
+     "the vibration's rms is 1e-31 rad; what is below 1e-30 is 0: write that"),
+    (lambda: simulate_scan(PATHS[0], 0, 1), "the number of runs is 0: it must be finite, at least 1"),
+    (lambda: simulate_scan(PATHS[0], 4, 1, None, 1),
+     "the number of samples in a pass is 1: it must be finite, at least 2"),
+    (lambda: detection_times(replace(PATHS[0], detector=Detector(1e-9, 1e-5))),
+     "the beam stays on a target for 8.39e+06 looks, each of which detects it with a probability of 1e-05: scan "
+     "faster, or count several looks as one"),
+    (lambda: detection_times(replace(PATHS[0], search=replace(SOUGHT, overlap=0.9995)), 1e-6),
+     "a target is within reach of 3.23e+03 tracks, and 4 looks on each: the tracks lie 13 nrad apart, and beam "
+     "and vibration reach 21 µrad; let them overlap less, or scan a steadier beam"),
+    (lambda: Vibration(-1e-6, 1.0), "Vibration.rms_rad is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: Vibration(1e-6, 0.0), "Vibration.correlation_time_s is 0 s: it must be finite, above 0 s"),
+    (lambda: highest_speed(SOUGHT, 0.0), "the detection time is 0 s: it must be finite, above 0 s"),
+    (lambda: Search(31e-6, 13e-6, 1.0, 0.9),
+     "Search.overlap is 1: it must be finite, at least 0 and below 1; a share of a diameter"),
+    (lambda: Search(31e-6, 13e-6, -0.1, 0.9),
+     "Search.overlap is -0.1: it must be finite, at least 0 and below 1; a share of a diameter"),
+    (lambda: Search(0.9, 13e-6, 0.2, 0.9),
+     "the radius that covers the pointing error is 1.931 rad: it must be finite, above 0 and below 1.571 rad"),
+    (lambda: replace(PATHS[0], speed_rad_s=0.5),
+     "at 500 mrad/s the beam crosses the target faster than the detection time of 2 ms: scan at 13 mrad/s or slower"),
+    (lambda: replace(PATHS[1], speed_rad_s=0.5),
+     "at 500 mrad/s the beam crosses the target faster than the detection time of 2 ms: scan at 13 mrad/s or slower"),
+    (lambda: replace(PATHS[2], dwell_s=1.5e-3),
+     "the dwell of 1.5 ms is shorter than the detection time of 2 ms: dwell at least that long"),
+    (lambda: replace(PATHS[2], settle_s=-1.0), "StepStare.settle_s is -1 s: it must be finite, at least 0 s"),
+    (lambda: replace(PATHS[1], turn_around_s=-0.1), "Raster.turn_around_s is -100 ms: it must be finite, at least 0 s"),
+    (lambda: Detector(0.0), "Detector.detection_time_s is 0 s: it must be finite, above 0 s"),
+    (lambda: Detector(1.0, 0.0), "Detector.probability is 0: it must be finite, above 0, at most 1"),
+])  # fmt: skip
+def test_a_refusal_of_a_search_says_what_its_beam_does(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

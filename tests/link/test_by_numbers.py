@@ -233,3 +233,73 @@ def test_a_refusal_of_a_number_says_it_and_its_bounds(call, error, words):
 ])  # fmt: skip
 def test_searches_by_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [(t := scan_times(9e-5, 2.3e-5, 4e-3)).probability, t.mean_s, t.std_s, t.quantile(0.9)],
+     "0.989755716 0.210639529 0.198041576 0.513042287"),
+    (lambda: [(t := scan_times(2e-6, 8e-6, 0.5, coverage=0.4)).probability, t.mean_s, t.quantile(0.2),
+            t.cumulative(0.05)],
+     "0.488145408 0.00625807749 0 0.476784917"),
+    (lambda: [(t := scan_times(9e-5, 2.3e-5, 4e-3, overlap=0.8, detection_probability=0.3)).probability, t.mean_s],
+     "0.557146485 0.511637508"),
+    (lambda: [received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, losses_db={"a": 1.25, "b": 0.5}).margin_db(-50.0)],
+     "-8.05088715"),
+    (lambda: [x.value for x in received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, pointing_error_rad=3e-5, losses_db={"a":
+            1.25}).lines],
+     "24.7712125 103.0103 -19.5432517 -295.963597 111.881198 -1.25"),
+    (lambda: [received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, pointing_error_rad=0.0).lines[2].value], "0"),
+])  # fmt: skip
+def test_beams_and_searches_by_numbers_at_their_edges(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: str(received_power(0.3, 2e-7, 4e5, 0.1, 8e-7).warnings),
+     "('Transmit gain: the far field of this beam begins at 16210 km',)"),
+    (lambda: str(received_power(0.3, 2e-7, 4e7, 0.1, 8e-7).warnings), "()"),
+    (lambda: str(received_power(0.3, 2.5e-5, 4e7, 0.1, 8e-7, losses_db={"code": 1.25}).lines[5]),
+     "Line(name='code', value=-1.25, unit='dB', basis='given', source='given', regime='', warning='')"),
+    (lambda: str(received_power(1e-3, 2.5e-5, 4e7, 0.1, 8e-7).lines[1].source), "theta = 25 µrad at 1/e2"),
+])  # fmt: skip
+def test_what_a_beam_or_a_search_by_numbers_says_of_its_numbers(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: received_power(0.3, 2e-5, 4e7, 0.1, 0.0), "the wavelength is 0 m: it must be finite, above 0 m"),
+    (lambda: received_power(0.3, 2e-5, 4e7, -0.1, 8e-7),
+     "the receiving aperture is -100 mm: it must be finite, above 0 m"),
+    (lambda: received_power(0.3, -2e-5, 4e7, 0.1, 8e-7), "the half angle is -20 µrad: it must be finite, above 0 rad"),
+    (lambda: received_power(0.3, 2e-5, math.inf, 0.1, 8e-7), "the distance is inf m: it must be finite, above 0 m"),
+    (lambda: received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, pointing_error_rad=-1e-6),
+     "the pointing error is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, losses_db={"fibre": -1.5}),
+     "the loss 'fibre' is -1.5 dB: it must be finite, at least 0 dB; a loss is positive"),
+    (lambda: received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, losses_db={"fibre": 1e-31}),
+     "the loss 'fibre' is 1e-31 dB: nothing is below 1e-30 or above 1e+30 in SI units"),
+    (lambda: scan_times(0.0, 2e-5, 5e-3), "sigma_rad is 0 rad: it must be finite, above 0 rad"),
+    (lambda: scan_times(1e-31, 2e-5, 5e-3),
+     "sigma_rad is 1e-31 rad: nothing is below 1e-30 or above 1e+30 in SI units"),
+    (lambda: scan_times(1e-4, 0.0, 5e-3), "the radius of the beam is 0 rad: it must be finite, above 0 rad"),
+    (lambda: scan_times(1e-4, 2e-5, math.nan), "the detection time is nan s: it must be finite, above 0 s"),
+    (lambda: scan_times(1e-4, 2e-5, 5e-3, overlap=0.0),
+     "the overlap is 0: it must be finite, above 0 and below 1; without overlap some targets are never lit long "
+     "enough"),
+    (lambda: scan_times(1e-4, 2e-5, 5e-3, overlap=1.0),
+     "the overlap is 1: it must be finite, above 0 and below 1; without overlap some targets are never lit long "
+     "enough"),
+    (lambda: scan_times(1e-4, 2e-5, 5e-3, jitter_rms_rad=1e-31),
+     "the jitter is 1e-31 rad: nothing is below 1e-30 or above 1e+30 in SI units"),
+    (lambda: scan_times(1e-4, 2e-5, 5e-3, detection_probability=0.0),
+     "Detector.probability is 0: it must be finite, above 0, at most 1"),
+    (lambda: scan_times(1e-4, 2e-5, 5e-3, coverage=-0.1),
+     "Search.coverage is -0.1: it must be finite, above 0 and below 1; Gaussian errors have no edge"),
+    (lambda: scan_times(1e-4, 2.0, 5e-3),
+     "Search.beam_radius_rad is 2 rad: it must be finite, above 0 and below 1.571 rad; an angle from the line of "
+     "sight is meant"),
+])  # fmt: skip
+def test_a_refusal_by_numbers_names_the_one_that_is_wrong(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

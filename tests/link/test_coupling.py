@@ -464,3 +464,89 @@ def test_radial_errors_at_an_end_without_symmetry_come_from_all_directions(share
     lost = FIBRE.loss_db(x, y) - FIBRE.loss_db(0.0)
     power = (10.0 ** (-0.1 * lost)).mean(axis=1) @ share / share.sum()
     assert found.mean_db == pytest.approx(-10.0 * math.log10(power), rel=1e-9)
+
+
+ROUND = Pupil(0.11, 8.5e-7, 0.2, Aberrations(3e-8, 0.0, 0.0, -2e-8), 1.2)
+OPEN = Pupil(0.11, 8.5e-7, 0.0, Aberrations(defocus_m=4e-8))
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [SingleModeFibre(ROUND).share(x) for x in (0.0, 3e-6, -3e-6, 2e-3)],
+     "0.674516797 0.491522981 0.491522981 2.10546046e-08"),
+    (lambda: SingleModeFibre(ROUND).loss_db([[0.0, 2e-6], [4e-6, 9e-6]], 1e-6).ravel(),
+     "1.85979532 2.46604314 4.3613059 17.3839479"),
+    (lambda: [SingleModeFibre(ROUND, 2e-6).worst_loss_db(3e-6), SingleModeFibre(ROUND).worst_loss_db(0.0)],
+     "5.6963621 1.71007231"),
+    (lambda: [SingleModeFibre(ROUND).error_rad(x) for x in (0.3, 12.0, 160.0)], "1.41381148e-06 8.11951515e-06 inf"),
+    (lambda: [Disk(OPEN, 0.0, 5e-6).share(x) for x in (0.0, 4e-6, 5e-6, 9e-6, 1e-3)],
+     "0.576442013 0.375676209 0.293541914 0.0609907777 7.93145242e-08"),
+    (lambda: [Disk(OPEN, 2e-6, 5e-6).error_rad(2.0), Disk(OPEN, 0.0, 5e-6).worst_loss_db(6e-6)],
+     "4.1153784e-06 6.65445103"),
+    (lambda: [Disk(OPEN, 0.0, 2e-3).share(x) for x in (0.0, 1.99e-3, 2e-3, 2.01e-3)],
+     "0.999207812 0.938956202 0.496954863 0.0580009754"),
+    (lambda: [coupling.best_truncation(x) for x in (0.0, 0.5, 0.9)], "1.12090642 0.924324525 0.743978765"),
+    (lambda: [coupling.turbulent_share(0.7, x) for x in (0.0, 0.4, 900.0)], "0.6124829 0.442433486 0.00068611644"),
+    (lambda: [Pupil(0.11, 8.5e-7, x).open_area for x in (0.0, 0.6)], "0.5 0.32"),
+    (lambda: OPEN.intensity(np.array([0.0, 2.0, 70.0]))[0], "0.228893618 0.0770003033 2.19797643e-08"),
+    (lambda: ROUND.intensity(np.array([0.0, 2.0, 70.0]))[0], "0.0562097331 0.0231642315 1.11057053e-07"),
+    (lambda: Pupil(0.11, 8.5e-7, 0.2, Aberrations(coma_m=5e-8)).intensity(np.array([1.5]))[:5, 0],
+     "0.10782482 0.00565570518 0.00282216612 -1.48532311e-05 9.67035319e-06"),
+    (lambda: Pupil(0.11, 8.5e-7, 0.2, Aberrations(astigmatism_m=5e-8)).intensity(np.array([1.5]))[::4, 0],
+     "0.110495424 0.000444057908 1.07728302e-08"),
+    (lambda: Pupil(0.11, 8.5e-7, 0.2, truncation=1.5, shift=0.4).intensity(np.array([1.5]))[[0, 2], 0],
+     "0.0192698842 0.000536072797"),
+    (lambda: Pupil(0.11, 8.5e-7, 0.2, truncation=30.0).intensity(np.array([0.0, 1.5]))[0],
+     "1.66055128e-38 1.58507176e-38"),
+    (lambda: Pupil(0.11, 8.5e-7, 0.0, truncation=60.0).intensity(np.array([0.0, 1.5]))[0],
+     "1.92901235e-08 1.92840962e-08"),
+    (lambda: [Aberrations(1e-8, 2e-8, 3e-8, 4e-8).wavefront_m(np.array(r), np.array(a)) for r, a in ((0.0, 0.0), (1.0,
+            0.0), (0.5, 2.0))],
+     "7.2122211e-08 2.40605836e-07 -5.77654189e-09"),
+    (lambda: [(m := coupling.of_jitter(SingleModeFibre(ROUND, 1e-6), Jitter((1e-6, 0.0), (2e-6, 0.0)))).mean_db,
+            m.loss_db[0], m.loss_db[-1]],
+     "0.878337514 -0.149723012 22.8351384"),
+    (lambda: [(m := coupling.of_jitter(SingleModeFibre(ROUND, 1e-6), Jitter((1e-6, -2e-6), (0.0, 0.0)))).mean_db,
+            m.loss_db.size],
+     "1.06894842 1"),
+    (lambda: [(m := coupling.of_jitter(SingleModeFibre(ROUND), Jitter((1e-6, 0.0), (2e-6, 1e-6)))).mean_db,
+            float(m.beyond(3.0))],
+     "0.808930871 0.0571213055"),
+    (lambda: [(m := coupling.of_radii(SingleModeFibre(ROUND, 1e-6), np.array([1e-6, 3e-6]), np.array([0.75,
+            0.25]))).mean_db, m.loss_db.size],
+     "0.414678119 64"),
+    (lambda: [(m := coupling.of_beam(beams.GaussianFall(5e-6), np.array([4e-6, 1e-6]), np.array([0.3, 0.7]))).mean_db,
+            *m.loss_db, *m.share],
+     "1.3691956 0.347435586 5.55896937 0.7 0.3"),
+    (lambda: [(b := BothEnds(FEW, Losses.single(1.5))).quantile_db(0.3), b.quantile_db(0.99), b.beyond(2.0), b.mean_db],
+     "3.8 2 0.9375 3.01572514"),
+    (lambda: [BothEnds(Losses.single(1.0), Losses.single(0.5)).quantile_db(0.5)], "1.5"),
+    (lambda: Pupil(0.11, 8.5e-7, 0.2, Aberrations(defocus_m=5e-8), 1.5, 0.4).intensity(np.array([1.5]))[:3, 0],
+     "0.0174136824 -0.0034658307 0.000562174249"),
+])  # fmt: skip
+def test_ends_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: SingleModeFibre(OPEN),
+     "the truncation is 0: it must be finite, above 0; the mode of a fibre has a radius"),
+    (lambda: Disk(OPEN), "the radius is 0 rad: it must be finite, above 0 rad"),
+    (lambda: replace(ROUND, stop=0.2),
+     "the stop is 0.2: it must be finite, above 0.2; the obscuration is as wide: no light passes"),
+    (lambda: replace(ROUND, shift=7.0),
+     "truncation times shift is 8.4: it must be finite, at most 8; a mode so far off the middle for its width "
+     "takes no light to speak of, or is not resolved"),
+    (lambda: replace(ROUND, aberrations=Aberrations(coma_m=-4.3e-7)),
+     "coma_m is 430 nm: it must be finite, at most 425 nm; half a wavelength, beyond which the light has no core"),
+    (lambda: replace(ROUND, obscuration=1.0), "Pupil.obscuration is 1: it must be finite, at least 0 and below 1"),
+    (lambda: Aberrations(spherical_m=math.inf), "Aberrations.spherical_m is inf m: it must be finite"),
+    (lambda: coupling.best_truncation(-0.1), "the obscuration is -0.1: it must be finite, at least 0 and below 1"),
+    (lambda: coupling.turbulent_share(0.0, 1.0), "the truncation is 0: it must be finite, above 0"),
+    (lambda: coupling.turbulent_share(1.0, -1.0), "the ratio of the areas is -1: it must be finite, at least 0"),
+    (lambda: coupling.narrowed(ROUND, 0.001, 0.7),
+     "the stop is 0.0127273: it must be finite, above 0.2; the obscuration is as wide: no light passes"),
+])  # fmt: skip
+def test_a_refusal_of_an_end_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

@@ -9,7 +9,7 @@ import pytest
 from scipy import integrate, optimize, signal, stats
 
 from microrad.core import lti
-from microrad.link.error_budget.assembly import source_of
+from microrad.link.error_budget.assembly import judge, requirement_of, source_of, stated
 from microrad.link.error_budget.budget import beyond, budget, shares, total
 from microrad.link.error_budget.contributions import Requirement, _at_its_worst, contribution, contributions
 from microrad.link.error_budget.correlation import Correlation
@@ -18,6 +18,7 @@ from microrad.link.error_budget.sources import ErrorSource, Spread
 from microrad.loop.disturbance import Disturbance, SpectralLine, first_order, olympus
 from microrad.loop.disturbance.windows import ErrorIndex, Motion, windowed_rms
 from microrad.mission.source_list import read_sources
+from microrad.mission.tables.error_budget import BudgetRequirement, BudgetSource
 from places import ROOT
 
 ONE = np.array([1.0])
@@ -1160,3 +1161,208 @@ def come_to(*axes, kind="APE", window_s=None, spacing_s=None, **more):
 ])  # fmt: skip
 def test_budgets_of_sources_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+def alone_of(kind, spread, mean, width, takes="APE", times=(None, None, None), how="temporal", axes=(0,), **more):
+    """Mean, deviation, sum by the rules and quantile of one source by itself."""
+    gains = more.pop("gains", np.array([1.2, -0.7]))
+    one = ErrorSource("one", kind, Spread(spread, mean, width), gains, **more)
+    window_s, spacing_s, observation_s = times
+    asked = Requirement(ErrorIndex(takes, window_s, spacing_s), 0.95, how, axes, observation_s=observation_s)
+    (found,) = budget([one], [asked])
+    return [*found.mean_rad, *found.sigma_rad, found.by_rules_rad, found.quantile_rad]
+
+
+RINGS = lti.StateSpace(
+    np.array([[0.0, 1.0], [-9.0, -0.8]]), np.array([[0.0], [1.0]]), np.array([[4.0, 0.0], [0.0, 1.5]]), np.zeros((2, 1))
+)
+PDE, PRE = (1.5, 9.0, 30.0), (1.5, 47.0, 30.0)
+
+
+def stated_as(kind, statistic, **more):
+    """Spread, times and spectrum of a source that a mission states."""
+    table = BudgetSource.model_construct(
+        kind=kind, statistic=statistic, gains=(1.0, 0.5), axes="each", **{**NO_TIMES, **more}
+    )
+    one = source_of("one", table, "here")
+    spectrum = [] if one.process is None else [*one.process.A.ravel(), (one.process.C @ one.process.B).item() ** 2]
+    times = [each for each in (one.freq_hz, one.period_s, one.decay_s) if each is not None]
+    return [one.size.mean, one.size.width, one.size.worst, one.even_in_time, one.apart, *times, *spectrum]
+
+
+NO_TIMES = dict.fromkeys(("size_rad", "rate_rad_s", "corner_hz", "frequency_hz", "period_s", "decay_s"))
+ASKED = BudgetRequirement.model_construct(
+    index="PDE", window_s=1.5, spacing_s=9.0, observation_s=30.0, confidence=0.93, interpretation="mixed", axes="z",
+    limit_rad=7e-6,
+)  # fmt: skip
+SPECTRAL = judge(
+    stated(
+        [
+            ErrorSource("hum", "process", Spread("gaussian", 1.5, 0.2), np.array([0.6, -1.1]),
+                        process=first_order(0.02, 3.0, convention="per-axis", name="hum")),
+            ErrorSource("wheel", "periodic", Spread("fixed", 0.4), np.array([0.3, 0.9]), freq_hz=17.0),
+        ],
+        {"a": Requirement(ErrorIndex("RPE", 0.2), limit_rad=4.0), "b": replace(APE, confidence=0.9, axes=(1,))},
+    ),
+    None,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: alone_of("per-observation", "gaussian", 0.3, 0.5, "PRE", PRE, "temporal"), "3.6 0 3.6 3.6"),
+    (lambda: alone_of("per-observation", "uniform", 0.3, 0.5, "PRE", PRE, "temporal", (1,)), "0.7 0 0.7 0.7"),
+    (lambda: alone_of("constant", "uniform", 0.4, 0.9, how="temporal"), "1.56 0 1.56 1.56"),
+    (lambda: alone_of("constant", "gaussian", -0.4, 0.9, how="temporal", axes=(1,)), "2.17 0 2.17 2.17"),
+    (lambda: alone_of("drift", "uniform", 0.02, 0.03, "APE", how="temporal", period_s=40.0),
+     "1.2 0.692820323 2.55790288 2.28"),
+    (lambda: alone_of("periodic", "gaussian", 1.1, 0.8, "MPE", (0.4, None, None), "temporal", freq_hz=0.7),
+     "0 2.60139617 5.0986428 3.66758883"),
+    (lambda: alone_of("transient", "fixed", 1.3, 0.0, "MPE", (2.0, None, None), "temporal", (1,), period_s=9.0,
+            decay_s=3.0, gains=RINGS),
+     "-0.0208915461 0.023121252 0.0662083673 0.0781506148"),
+    (lambda: alone_of("transient", "uniform", 0.0, 1.3, "PDE", PDE, "temporal", period_s=50.0, decay_s=6.0),
+     "0.162659341 0.24672253 0.646226613 0.771863626"),
+    (lambda: alone_of("per-observation", "gaussian", 0.3, 0.5, "PRE", PRE, "ensemble"),
+     "0.677369753 0.511753773 1.68038872 1.6634988"),
+    (lambda: alone_of("per-observation", "uniform", 0.3, 0.5, "PRE", PRE, "ensemble", (1,)),
+     "0.233361816 0.165011719 0.556778843 0.543555754"),
+    (lambda: alone_of("constant", "uniform", 0.4, 0.9, how="ensemble"),
+     "0.646666667 0.448355018 1.52542635 1.45198407"),
+    (lambda: alone_of("constant", "gaussian", -0.4, 0.9, how="ensemble", axes=(1,)),
+     "0.55178586 0.413893195 1.36300162 1.34791408"),
+    (lambda: alone_of("drift", "uniform", 0.02, 0.03, "APE", how="ensemble", period_s=40.0),
+     "1.04 0.728834686 2.46848974 2.25597628"),
+    (lambda: alone_of("periodic", "gaussian", 1.1, 0.8, "MPE", (0.4, None, None), "ensemble", freq_hz=0.7),
+     "1.22159272 0.743546723 2.67891752 2.54094495"),
+    (lambda: alone_of("transient", "fixed", 1.3, 0.0, "RPE", (2.0, None, None), "ensemble", period_s=50.0,
+            decay_s=3.0, gains=RINGS),
+     "0.500775341 0 0.500775341 0.500775341"),
+    (lambda: alone_of("transient", "uniform", 0.0, 1.3, "PDE", PDE, "ensemble", period_s=50.0, decay_s=6.0),
+     "0.535826245 0.309359427 1.14215958 1.01806987"),
+    (lambda: alone_of("per-observation", "gaussian", 0.3, 0.5, "PRE", PRE, "mixed"),
+     "0 0.848528137 1.66308459 1.66308459"),
+    (lambda: alone_of("per-observation", "uniform", 0.3, 0.5, "PRE", PRE, "mixed", (1,)),
+     "0 0.285773803 0.560106362 0.543475242"),
+    (lambda: alone_of("constant", "uniform", 0.4, 0.9, how="mixed"), "0.48 0.623538291 1.70211259 1.452"),
+    (lambda: alone_of("constant", "gaussian", -0.4, 0.9, how="mixed", axes=(1,)), "0.28 0.63 1.51477731 1.34740167"),
+    (lambda: alone_of("drift", "uniform", 0.02, 0.03, "APE", how="mixed", period_s=40.0),
+     "0.48 0.554256258 1.5663223 1.62046288"),
+    (lambda: alone_of("periodic", "gaussian", 1.1, 0.8, "MPE", (0.4, None, None), "mixed", freq_hz=0.7),
+     "-4.16333634e-17 1.01093752 1.98140113 2.03744794"),
+    (lambda: alone_of("transient", "fixed", 1.3, 0.0, "MPE", (2.0, None, None), "mixed", (1,), period_s=9.0,
+            decay_s=3.0, gains=RINGS),
+     "-0.0208915461 0.023121252 0.0662083673 0.0781506148"),
+    (lambda: alone_of("transient", "uniform", 0.0, 1.3, "PDE", PDE, "mixed", period_s=50.0, decay_s=6.0),
+     "0 0.170616595 0.334402382 0.419824042"),
+    (lambda: alone_of("periodic", "fixed", 1.3, 0.0, "RPE", (2.0, None, None), freq_hz=0.7),
+     "0 1.07698874 2.11085914 1.74411996"),
+    (lambda: alone_of("periodic", "fixed", 1.3, 0.0, "RPE", (2.0, None, None), freq_hz=9.0),
+     "0 1.10308658 2.16200997 1.55519104"),
+    (lambda: alone_of("periodic", "fixed", 1.3, 0.0, "RPE", (2.0, None, None), "ensemble", freq_hz=0.3),
+     "1.9524331 0 1.9524331 1.9524331"),
+    (lambda: alone_of("periodic", "fixed", 1.3, 0.0, "PDE", PDE, freq_hz=0.7, gains=RINGS, axes=(0, 1)),
+     "0 0 0.0258219913 0.0425891436 0.0976174301 0.0600753388"),
+    (lambda: alone_of("random", "fixed", 1.3, 0.0, even_in_time=True, apart=True, axes=(0, 1)),
+     "0 0 0.90066642 0.525388745 2.04366389 1.57743954"),
+    (lambda: alone_of("random", "uniform", 1.3, 0.4, "RPE", (2.0, None, None), "mixed"),
+     "0 1.58442419 3.10541434 3.15221005"),
+    (lambda: alone_of("constant", "uniform", 0.0, 0.9, how="ensemble"), "0.54 0.311769145 1.1510563 1.026"),
+    (lambda: alone_of("constant", "uniform", 0.9, 0.4, how="ensemble"), "1.08 0.277128129 1.62316115 1.512"),
+    (lambda: alone_of("drift", "fixed", 0.02, 0.0, "PRE", (1.5, 80.0, 30.0), "mixed", period_s=40.0), "0 0 0 0"),
+    (lambda: alone_of("drift", "fixed", 0.02, 0.0, "PRE", (1.5, 93.0, 30.0), "mixed", period_s=40.0),
+     "0 0.449639856 0.881277924 0.6479922"),
+    (lambda: alone_of("transient", "fixed", 2.0, 0.0, "MPE", (7.0, None, None), period_s=50.0, decay_s=0.4),
+     "0.0012757991 0.009265774 0.0194363824 0.000623181984"),
+    (lambda: [x for each in shares(budget([source("constant", 3.0), replace(source("constant", -1.0), name="b")],
+            [Requirement(ErrorIndex("APE"), axes=(0,), limit_rad=5.0)])[0]) for x in (each.growth, each.without_rad,
+            each.allowed, each.part_rad)],
+     "1.5 1 2 3 -0.5 3 8 -1"),
+    (lambda: [x for each in shares(budget([source("constant", 3.0), replace(source("constant", -3.0), name="b")],
+            [Requirement(ErrorIndex("APE"), axes=(0,))])[0]) for x in (each.growth, each.without_rad)],
+     "0 3 0 3"),
+    (lambda: stated_as("drift", "2-sigma", rate_rad_s=3e-7, period_s=40.0), "0 1.5e-07 4.5e-07 0 1 40"),
+    (lambda: stated_as("constant", "bound", size_rad=4e-6), "0 4e-06 4e-06 0 1"),
+    (lambda: stated_as("constant", "fixed", size_rad=4e-6), "4e-06 0 4e-06 0 1"),
+    (lambda: stated_as("random", "3-sigma", size_rad=6e-6), "2e-06 0 2e-06 0 1"),
+    (lambda: stated_as("random", "bound", size_rad=6e-6), "6e-06 0 6e-06 1 1"),
+    (lambda: stated_as("process", "1-sigma", size_rad=6e-6, corner_hz=2.5), "6e-06 0 6e-06 0 1 -15.7079633 31.4159265"),
+    (lambda: stated_as("periodic", "3-sigma", size_rad=6e-6, frequency_hz=0.3), "0 2e-06 6e-06 0 1 0.3"),
+    (lambda: stated_as("transient", "1-sigma", size_rad=6e-6, decay_s=3.0, period_s=70.0), "0 6e-06 1.8e-05 0 1 70 3"),
+    (lambda: [(r := requirement_of(ASKED)).confidence, *r.axes, r.limit_rad, r.observation_s, r.index.window_s,
+            r.index.spacing_s],
+     "0.93 2 7e-06 30 1.5 9"),
+    (lambda: [x for each in SPECTRAL.judged for x in (each.total.quantile_rad, each.total.by_rules_rad,
+            each.size_rad[-1], each.size_rad.size, each.beyond[40])],
+     "1.97250857 2.05120111 5.2 97 0.000966489818 1.23950487 1.23934626 1.61135633 97 0.373827467"),
+    (lambda: [SPECTRAL.freq_hz[0], SPECTRAL.freq_hz[-1], SPECTRAL.freq_hz.size, *SPECTRAL.lines_hz.values()],
+     "0.1 510 320 17"),
+    (lambda: [SPECTRAL.spectra["hum"][at] for at in (0, 100, 319)], "0.138320311 0.11216471 4.7913221e-06"),
+])  # fmt: skip
+def test_sources_by_themselves_under_each_index_and_interpretation_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=1e-15, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: contributions([source("random", gains=np.ones(2))], Requirement(ErrorIndex("APE"), axes=(0, 2))),
+     "axis 2 is asked for, and the sources have 2 from 0 on"),
+    (lambda: contributions([source("random"), replace(source("random", gains=np.ones(2)), name="b")], APE),
+     "b has gains for 2 axes, and a random error for 1; give all as many"),
+    (lambda: contributions([source("random"), source("random")], APE), "two sources have one name; give each its own"),
+    (lambda: Requirement(ErrorIndex("APE"), 1.0), "a confidence of 1: give a share above 0 and below 1"),
+    (lambda: Requirement(ErrorIndex("APE"), interpretation="worst"),
+     'no interpretation "worst"; give one of temporal, ensemble, mixed'),
+    (lambda: Requirement(ErrorIndex("APE"), axes=()),
+     "axes (): give one, or two for the radial error, by their places from 0"),
+    (lambda: Requirement(ErrorIndex("APE"), axes=(1, 1)),
+     "axes (1, 1): give one, or two for the radial error, by their places from 0"),
+    (lambda: Requirement(ErrorIndex("APE"), axes=(-1,)),
+     "axes (-1,): give one, or two for the radial error, by their places from 0"),
+    (lambda: Requirement(ErrorIndex("APE"), limit_rad=0.0), "a limit of 0 rad; give a finite one above zero"),
+    (lambda: Requirement(ErrorIndex("APE"), observation_s=3.0), "APE has no observation_s: leave it out"),
+    (lambda: Requirement(ErrorIndex("PDE", 1.0, 2.0)), "PDE needs observation_s: give the time in s"),
+    (lambda: Requirement(ErrorIndex("PDE", 1.0, 2.5), observation_s=3.25),
+     "PDE: both windows have to lie in the observation period of 3.25 s; give it longer"),
+    (lambda: Requirement(ErrorIndex("PRE", 1.0, 2.5), observation_s=3.25),
+     "PRE: its windows lie in two observation periods of 3.25 s; space them wider"),
+    (lambda: alone_of("drift", "fixed", 1.0, 0.0, "PDE", (1.0, 9.0, 30.0), period_s=10.0),
+     "one: PDE looks at 10 s, and it begins anew every 10 s; give shorter times, or the class that it has over "
+     "many periods"),
+    (lambda: alone_of("transient", "fixed", 1.0, 0.0, "MPE", (12.0, None, None), period_s=10.0, decay_s=1.0),
+     "one: MPE looks at 12 s, and it begins anew every 10 s; give shorter times, or the class that it has over "
+     "many periods"),
+    (lambda: alone_of("transient", "fixed", 1.0, 0.0, "PRE", (5.5, 45.0, 30.0), period_s=10.0, decay_s=1.0),
+     "one: no two windows of 5.5 s so far apart lie within periods; give shorter ones"),
+    (lambda: alone_of("random", "fixed", 1.0, 0.0, gains=RINGS),
+     "one: an error that is anew from moment to moment has no spectrum, so that nothing is known of it behind a "
+     'transfer; give gains, or the class "process"'),
+    (lambda: alone_of("drift", "fixed", 1.0, 0.0, gains=RINGS, period_s=10.0),
+     "one: behind a transfer each new begin of a drift is a step, of which its rate says nothing; give gains, or "
+     "what is left as a process"),
+    (lambda: Spread("even", 1.0), 'no shape "even" of a spread; give one of fixed, gaussian, uniform'),
+    (lambda: Spread("gaussian", 1.0, -1.0), "a spread of mean 1 and width -1: give finite ones, the width >= 0"),
+    (lambda: Spread("uniform", math.inf, 1.0), "a spread of mean inf and width 1: give finite ones, the width >= 0"),
+    (lambda: Spread("fixed", 1.0, 0.25), 'a fixed size has no width, and 0.25 is given: say "gaussian" or "uniform"'),
+    (lambda: source("noise"),
+     'a noise error: no class "noise"; give one of constant, per-observation, random, process, periodic, drift, '
+     "transient"),
+    (lambda: source("periodic"), "a periodic error: a periodic error needs freq_hz; give it"),
+    (lambda: source("random", freq_hz=1.0), "a random error: a random error has no freq_hz; leave it out"),
+    (lambda: source("drift", period_s=0.0), "a drift error: period_s is 0; give a finite number above zero"),
+    (lambda: source("process"), "a process error: a spectrum belongs to a process, and to nothing else"),
+    (lambda: source("random", -1.5), "a random error: a random error of size -1.5; give a size of 0 or above"),
+    (lambda: source("random", gains=np.ones((2, 1))),
+     "a random error: its gains have the shape (2, 1); give a finite one for each axis"),
+    (lambda: source("constant", gains=np.array([1.0, math.nan])),
+     "a constant error: its gains have the shape (2,); give a finite one for each axis"),
+    (lambda: budget([], [APE]), "a budget without a source: give one or more"),
+    (lambda: budget(two(), [APE], [Correlation("a", "c", 0.5)]),
+     "correlation of a and c: name two sources out of a, b"),
+    (lambda: budget(two(), [APE], [Correlation("a", "a", 0.5)]),
+     "correlation of a and a: name two sources out of a, b"),
+    (lambda: budget(two(), [APE], [Correlation("a", "b", 1.25)]),
+     "correlation of a and b: the coefficient is 1.25; give one from -1 to 1"),
+])  # fmt: skip
+def test_a_refusal_of_a_budget_of_two_axes_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

@@ -730,3 +730,96 @@ def test_a_sampling_period_that_is_none_is_refused_as_a_period(tmp_path, period_
     path.write_text("power\n" + "1\n" * 300)
     with pytest.raises(FadeSeriesError, match=r"a\.csv: the sampling period is .*: it must be finite, above 0 s"):
         read_fade_series(path, unit="linear", normalised="mean", period_s=period_s)
+
+
+DIPS = FadeSeries.of(
+    np.r_[[0.1] * 3, [1.0] * 50, [0.1], [1.0] * 60, [0.1] * 4, [1.0] * 70, [0.1] * 9, [1.0] * 40, [0.1] * 2],
+    2e-3, "dips", unit="linear", normalised="as-given",
+)  # fmt: skip
+
+
+def flat_of(powers, normalised, unit="linear"):
+    return FadeSeries.of(np.repeat(powers, 100), 2e-3, "flat", unit=unit, normalised=normalised)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [(s := flat_of([4.0, 1.0, 3.0], "mean")).power[0], s.power.mean(), s.duration_s], "1.5 1 0.6"),
+    (lambda: [(s := flat_of([4.0, 1.0, 3.0], "largest")).power[1], s.power.max()], "1 1"),
+    (lambda: [flat_of([-3.0, 2.0], "as-given", unit="dB").power[x] for x in (0, 1)], "0.501187234 0.501187234"),
+    (lambda: [flat_of([-math.inf, 2.0], "largest", unit="dB").power[x] for x in (0, 1)], "0 0"),
+    (lambda: [(f := DIPS.fades(0.5)).share, f.per_second, f.mean_s, f.median_s, f.ninetieth_s, f.longest_s,
+            f.unresolved, f.level],
+     "0.0794979079 8.36820084 0.00933333333 0.008 0.016 0.018 0.0526315789 0.5"),
+    (lambda: [(f := DIPS.fades(0.05)).share, f.per_second, f.mean_s, f.unresolved], "0 0 nan 0"),
+    (lambda: [(f := DIPS.fades(9.0)).share, f.per_second, f.mean_s, f.unresolved], "1 0 nan 0"),
+    (lambda: [part(DIPS, 5, 30).power.size, part(DIPS, 5, 30).power.sum(), part(DIPS, 5, 30).duration_s], "25 25 0.05"),
+    (lambda: [CODE.snr_for(x) for x in (0.4, 1e-3, 1e-9, 1e-30)], "0.326065054 0.916837117 2.14032479 6.9108001"),
+    (lambda: CODE.at([0.0, 0.05, 0.4, 3.0]), "0.5 0.49764532 0.303597411 1.47063659e-13"),
+    (lambda: mutual_information(np.array([0.0, 0.2, 1.0, 9.0])), "0 0.241510142 0.721762347 0.999933907"),
+    (lambda: [x[0] for x in CODE.parts(np.array([0.7]))],
+     "0.00839684711 0.151241488 0.328850021 0.440387168 0.490596802 0.599240192"),
+    (lambda: CODE.ratio([np.array([x, 0.5 * x]) for x in (0.9, 0.5, 0.4, 0.35, 0.33, 0.3)]),
+     "0.0439640897 0.499844362"),
+    (lambda: Threshold("t", 0.5, 800, 0.6).ratio([np.array([0.1, 0.9])]), "1 0"),
+    (lambda: [Threshold("t", 0.5, 800, 0.6).snr_for(1e-9), *Threshold("t", 0.5, 800, 0.6).parts(np.array([0.6]))[0]],
+     "0.6 0.546294975"),
+    (lambda: [(w := uneven(rate=2e6)).word_s, w.window, uneven("block", 3e-4).window, uneven("block", 1e-7,
+            rate=1e9).window],
+     "1.75e-05 1 12 1"),
+    (lambda: [uneven("block", 4e-4).mean_ratio(0.9), uneven("convolutional", 4e-4).mean_ratio(0.9),
+            uneven().mean_ratio(0.9)],
+     "0.427456862 0.426860638 0.427365128"),
+    (lambda: [(u := uneven("block", 4e-4)).penalty_db(1e-4), *(c := u.curve(1e-4, 3)).span_s, *c.penalty_db],
+     "13.0569206 0 5e-05 0.00055 0.00625 13.4656499 13.4630202 13.3339969 7.81994077"),
+    (lambda: [(c := coded_fading(uneven("block", 4e-3), 6.0, 1e-4)).words, c.ratio.value, c.lost.value,
+            c.margin_left_db],
+     "6 0.0442614707 0.666666667 -3.87090539"),
+])  # fmt: skip
+def test_a_series_at_its_edges_has_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: flat_of([1.0], "mean"),
+     "flat: the series has 100 samples; from 200 to 2000000 are taken: give a longer one."),
+    (lambda: flat_of([0.0, 0.0], "mean"),
+     "flat: no sample is above 0: there is no light in the series; name another one."),
+    (lambda: flat_of([1.0, -2.0], "mean"),
+     "flat: sample 100 is -2, and 100 such samples are in it: a power must be finite, 0 or above and at most "
+     '1e+30 (unit "dB" if these are levels); cut out a part without them.'),
+    (lambda: flat_of([1.0, 301.0], "mean", unit="dB"),
+     "flat: sample 100 is 301, and 100 such samples are in it: a power must be at most 300 dB; cut out a part "
+     "without them."),
+    (lambda: flat_of([1.0, 2e30], "mean"),
+     "flat: sample 100 is 2e+30, and 100 such samples are in it: a power must be finite, 0 or above and at most "
+     "1e+30; cut out a part without them."),
+    (lambda: flat_of([1.0, 2.0], "median"),
+     "flat: the normalisation is 'median'; give one of mean, largest, as-given."),
+    (lambda: flat_of([1.0, 2.0], "mean", unit="W"), "flat: the unit is 'W'; give one of linear, dB."),
+    (lambda: flat_of([math.nan, 2.0], "mean", unit="dB"),
+     "flat: sample 0 is nan, and 100 such samples are in it: a power must be at most 300 dB; cut out a part "
+     "without them."),
+    (lambda: FadeSeries.of(np.ones((100, 2)), 1.0, "s", unit="dB", normalised="mean"),
+     "s: the powers have the shape (100, 2); give one series, of shape (samples,)."),
+    (lambda: FadeSeries.of(np.ones(200), 0.0, "s", unit="dB", normalised="mean"),
+     "s: the sampling period is 0 s: it must be finite, above 0 s."),
+    (lambda: uneven("random", 1e-3), "the interleaving is 'random'; give one of none, block, convolutional."),
+    (lambda: uneven("block", 0.0),
+     "interleaving is 'block' and its span 0 s; give a span above 0 s, or interleaving \"none\" without one."),
+    (lambda: uneven("none", 1e-3),
+     "interleaving is 'none' and its span 1 ms; give a span above 0 s, or interleaving \"none\" without one."),
+    (lambda: uneven("block", -1e-3), "uneven: the span of the interleaver is -1 ms: it must be finite, at least 0 s."),
+    (lambda: uneven("block", 1.0),
+     "uneven: the series lasts 25 ms and the interleaver spans 1 s; give a series of many times that, or shorten "
+     "the latter."),
+    (lambda: uneven(rate=10.0),
+     "uneven: the series lasts 25 ms and a code word, 35 bits, lasts 3.5 s; give a series of many times that, or "
+     "shorten the latter."),
+    (lambda: uneven(rate=0.0), "uneven: the data rate is 0 bit/s: it must be finite, above 0 bit/s."),
+    (lambda: coded_fading(uneven(), 3.0, 0.0), "uneven: the error ratio is 0: it must be finite, above 0, at most 1."),
+    (lambda: code("ccsds"), 'no code is called "ccsds"; there is ccsds-k7-1-2'),
+])  # fmt: skip
+def test_a_refusal_of_a_coded_series_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -445,3 +446,166 @@ def test_the_wind_of_a_table_is_taken_for_the_profile_and_the_greenwood_frequenc
     slow = {line.name: line.value for line in found}
     assert slow["Greenwood frequency"] < 0.2 * lines["usual"]["Greenwood frequency"]
     assert slow["Scintillation index"] < 0.5 * lines["usual"]["Scintillation index"]
+
+
+SHAKES = {"jitter": {"bias": ["0.3 urad", "-0.5 urad"], "rms": ["1.1 urad", "0.6 urad"], "bandwidth": "90 Hz"}}
+UNLIKE = {
+    "fibre": ({"communication.coupling": FIBRE}, SHAKES),
+    "up": (UP, {"channel.turbulence.corrected_modes": 7}),
+    "disk": (
+        {"communication.coupling": PHOTODIODE, "channel.turbulence.corrected_modes": 4},
+        {"channel.turbulence.fades": "log-normal", "channel.turbulence.tilt": "gradient"},
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def unlike(tmp_path_factory):
+    """Links to a station that are unlike each other, each studied once."""
+    kept = cache(lambda case: link_study.run_link_study(ground_file(tmp_path_factory.mktemp(case), *UNLIKE[case])))
+    return kept
+
+
+def lines_with_air(study):
+    budgets = [line for each in study.budgets for line in (*each.lines, *each.totals)]
+    return [*budgets, *(line for _, lines in study.ground.beams for line in lines)]
+
+
+def over_elevation(study):
+    return [x for e in study.ground.elevations for x in (e.elevation_rad, e.range_m, e.air_db, e.fade_db, e.margin_db)]
+
+
+def of_the_air(study):
+    return [x for e in study.ground.elevations[::2] for x in (e.fried_m, e.isoplanatic_rad, e.rytov, e.index)]
+
+
+def of_conventions(study):
+    return [gained for each in study.ground.conventions for gained in each.gained_db.values()]
+
+
+def of_lines(study):
+    return [line.value for line in lines_with_air(study)]
+
+
+@pytest.mark.parametrize(("of", "case", "expected"), [
+    (over_elevation, "fibre",
+     "0.34906585 1197779.53 12.0763454 1.81099593 -1.71228403 0.523598776 913473.819 10.1036347 0.955328341 "
+     "3.46970983 0.785398163 686238.887 8.41352989 0.505913859 8.09364476 1.04719755 573203.153 7.47870545 "
+     "0.336083996 10.7616341 1.57079633 502382.214 6.84224717 0.245518641 12.6341441"),
+    (of_the_air, "fibre",
+     "0.111235311 6.41335173e-06 0.291319809 0.0334877975 0.171989789 2.05011568e-05 0.0769264339 0.00410659855 "
+     "0.211744268 3.56945872e-05 0.0407503589 0.00147335679"),
+    (of_conventions, "fibre",
+     "0.0698880562 1.331926 0 -0.000991542018 0 -0.00648058709 0 0"),
+    (of_lines, "fibre",
+     "30 100.115764 -0.97 -0.456731143 -0.20982239 0 -259.745101 -0.515926964 118.177563 -0.409586077 -0.97 "
+     "-1.82987858 0 -11.5604184 -1.81099593 -0.46 -3 -33.6451336 -31.9328496 -1.71228403 -3.89688154 36.9897 "
+     "89.0308999 -0.97 -0.976590042 -0.347435586 0 -263.045618 -0.794671082 -0.182730783 103.41628 -0.97 "
+     "-8.00724284 -45.8574079 -70 24.1425921 0.111235311 6.41335173e-06 29.1409762 0.291319809 0.0334877975 "
+     "4.79798131e-06 0.0705036617 4.06493925e-06 45.9764141 0.453837266 0.410833274 6.47058085e-06"),
+    (over_elevation, "up",
+     "0.34906585 1197779.53 2.5236302 4.5048791 6.04008594 0.523598776 913473.819 1.80713389 2.7313262 "
+     "10.8837508 0.785398163 686238.887 1.31852938 1.66501981 14.9230773 1.04719755 573203.153 1.09236334 "
+     "1.21569702 17.1619012 1.57079633 502382.214 0.954478373 0.958580744 18.7023888"),
+    (of_the_air, "up",
+     "0.111235311 6.41335173e-06 0.291319809 0.190324857 0.171989789 2.05011568e-05 0.0769264339 0.043272299 "
+     "0.211744268 3.56945872e-05 0.0407503589 0.0207900506"),
+    (of_conventions, "up",
+     "0.477961807 0.881305269 -0.459410305 0 -2.95557808 0 0 0"),
+    (of_lines, "up",
+     "30 100.115764 -0.97 -0.456731143 -1.14616299 0 -259.745101 -0.515926964 -2.00770324 118.177563 "
+     "-0.409586077 -0.97 -4.5048791 -0.46 -3 -25.8927637 -31.9328496 6.04008594 4.11463206 36.9897 89.0308999 "
+     "-0.97 -0.976590042 -0.347435586 0 -263.045618 -0.794671082 103.41628 -0.97 -6.55086067 -44.218295 -70 "
+     "25.781705 0.111235311 6.41335173e-06 29.1409762 0.291319809 0.190324857 6.075214e-06 0.0705036617 "
+     "4.06493925e-06 45.9764141 0.453837266 0.291943883 6.78537024e-06"),
+    (over_elevation, "disk",
+     "0.34906585 1197779.53 0.783080574 1.15420378 10.902527 0.523598776 913473.819 0.529466531 0.457733184 "
+     "14.2062273 0.785398163 686238.887 0.371350579 0.172476803 17.1340152 1.04719755 573203.153 0.30206037 "
+     "0.0953932509 18.8437241 1.57079633 502382.214 0.261002267 0.0624289781 20.0632328"),
+    (of_the_air, "disk",
+     "0.111235311 6.41335173e-06 0.291319809 0.0334877975 0.171989789 2.05011568e-05 0.0769264339 0.00410659855 "
+     "0.211744268 3.56945872e-05 0.0407503589 0.00147335679"),
+    (of_conventions, "disk",
+     "-0.0617710903 -1.331926 0 -0.0012497831 0 -0.00821649107 0 0"),
+    (of_lines, "disk",
+     "30 100.115764 -0.97 -0.456731143 -1.14616299 0 -259.745101 -0.515926964 118.177563 -0.409586077 -0.97 "
+     "-0.228783868 0 -0.26715361 -1.15420378 -0.46 -3 -21.0303226 -31.9328496 10.902527 9.06755468 36.9897 "
+     "89.0308999 -0.97 -0.976590042 -0.347435586 0 -263.045618 -0.794671082 -0.182730783 103.41628 -0.97 "
+     "-6.67531684 -44.5254819 -70 25.4745181 0.111235311 6.41335173e-06 29.1409762 0.291319809 0.0334877975 "
+     "4.64129254e-06 0.0705036617 4.06493925e-06 45.9764141 0.453837266 0.410833274 6.47058085e-06"),
+])  # fmt: skip
+def test_links_to_a_station_unlike_each_other_have_these_numbers(unlike, of, case, expected):
+    assert of(unlike(case)) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize(("case", "expected"), [
+    ("fibre", [
+        ("Free-space loss (dB): (lambda / (4 pi R))^2, R = 1198 km at 20 deg of elevation | mission file, line "
+         "83; mission file, line 73 | vacuum, far field | "),
+        ("Clear-sky loss (dB): Rayleigh scattering (Hansen and Travis 1974), haze and absorption, times m, air "
+         "mass m = 2.903 (Kasten and Young 1989) | mission file, line 29; mission file, line 30; mission file, "
+         "line 31; mission file, line 83 | clear sky, from 10 degrees of elevation; no clouds | "),
+        ("Turbulence coupling loss (dB): mean power into the single-mode fibre, r0 = 111 mm | mission file, line "
+         "33; mission file, line 34 | Kolmogorov's turbulence, long exposure | "),
+        ("Turbulence fade (dB): scintillation index 0.0335; what it adds to the pointing loss, all together "
+         "exceeded for 1 % of the time | mission file, line 33; mission file, line 34; mission file, line 35; "
+         "mission file, line 65 | any strength, by its index | "),
+        ("Turbulence spread loss (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = 70.5 mm | mission file, "
+         "line 33; mission file, line 34 | mean power on the axis, wander in it (Andrews and Phillips 2005) | "
+         "moderate turbulence: the Rytov variance is 0.454, above 0.3; an index is that for any strength "
+         "(Andrews and Phillips), but spread and wander are those of weak turbulence"),
+        ("Turbulence fade (dB): scintillation index 0.411, wander of 6.47 µrad rms; exceeded for 1 % of the time "
+         "| mission file, line 33; mission file, line 34; mission file, line 35; mission file, line 65 | any "
+         "strength, by its index | "),
+        ("Fried's parameter (m): (0.423 k^2 times the integral of Cn2)^(-3/5), at 20 deg of elevation | mission "
+         "file, line 33; mission file, line 34 | Kolmogorov's turbulence, flat air | "),
+        ("Isoplanatic angle (rad): (2.914 k^2 times that of Cn2 z^(5/3))^(-3/5) | mission file, line 33; mission "
+         "file, line 34 | Kolmogorov's turbulence, flat air | "),
+        ("Greenwood frequency (Hz): (0.102 k^2 times that of Cn2 v^(5/3))^(3/5), in air that the satellite does "
+         "not turn through | mission file, line 33; mission file, line 34 | Kolmogorov's turbulence, flat air | "),
+        ("Rytov variance (): 2.25 k^(7/6) times the integral of Cn2 z^(5/6) | mission file, line 33; mission "
+         "file, line 34 | plane wave | "),
+        ("Scintillation index (): plane wave, averaged over the aperture | mission file, line 33; mission file, "
+         "line 34 | any strength | "),
+        ("Angle of arrival (rad): rms about one axis, zernike | mission file, line 33; mission file, line 34 | "
+         "Kolmogorov's turbulence, flat air | "),
+        ("Scintillation index (): Gaussian beam on its axis | mission file, line 33; mission file, line 34 | any "
+         "strength | moderate turbulence: the Rytov variance is 0.454, above 0.3; an index is that for any "
+         "strength (Andrews and Phillips), but spread and wander are those of weak turbulence"),
+        ("Beam wander (rad): radial rms, dios-2004 | mission file, line 33; mission file, line 34 | Kolmogorov's "
+         "turbulence, flat air | "),
+    ]),
+    ("up", [
+        ("Turbulence spread loss (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = 111 mm, or what 7 "
+         "corrected modes and the point-ahead angle leave, if that is less | mission file, line 33; mission "
+         "file, line 34 | mean power on the axis, wander in it (Andrews and Phillips 2005) | the point-ahead "
+         "angle is 7.8 isoplanatic angles: adaptive optics measures other air than the beam goes through"),
+        ("Turbulence fade (dB): scintillation index 0.19, wander of 6.08 µrad rms; what it adds to the pointing "
+         "loss, all together exceeded for 1 % of the time | mission file, line 33; mission file, line 34; "
+         "mission file, line 35; mission file, line 62 | any strength, by its index | "),
+        ("Turbulence fade (dB): scintillation index 0.292; exceeded for 1 % of the time | mission file, line 33; "
+         "mission file, line 34; mission file, line 35; mission file, line 62 | any strength, by its index | "
+         "moderate turbulence: the Rytov variance is 0.454, above 0.3; an index is that for any strength "
+         "(Andrews and Phillips), but spread and wander are those of weak turbulence"),
+    ]),
+    ("disk", [
+        ("Turbulence coupling loss (dB): mean power into the detector, r0 = 111 mm | mission file, line 33; "
+         "mission file, line 34 | Kolmogorov's turbulence, long exposure | "),
+        ("Turbulence fade (dB): scintillation index 0.0335; what it adds to the pointing loss, all together "
+         "exceeded for 1 % of the time | mission file, line 33; mission file, line 34; mission file, line 35; "
+         "mission file, line 66 | any strength, by its index | "),
+        ("Turbulence spread loss (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = 70.5 mm, or what 4 "
+         "corrected modes and the point-ahead angle leave, if that is less | mission file, line 33; mission "
+         "file, line 34 | mean power on the axis, wander in it (Andrews and Phillips 2005) | moderate "
+         "turbulence: the Rytov variance is 0.454, above 0.3; an index is that for any strength (Andrews and "
+         "Phillips), but spread and wander are those of weak turbulence; the point-ahead angle is 12 isoplanatic "
+         "angles: adaptive optics measures other air than the beam goes through"),
+        ("Turbulence fade (dB): scintillation index 0.411, wander of 6.47 µrad rms; exceeded for 1 % of the time "
+         "| mission file, line 33; mission file, line 34; mission file, line 35; mission file, line 66 | any "
+         "strength, by its index | "),
+    ]),
+])  # fmt: skip
+def test_lines_of_the_air_say_what_they_are_and_where_they_come_from(unlike, case, expected):
+    lines = lines_with_air(unlike(case))
+    written = {f"{x.name} ({x.unit}): {x.basis} | {x.source} | {x.regime} | {x.warning}" for x in lines}
+    assert not set(expected) - written

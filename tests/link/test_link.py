@@ -1,6 +1,7 @@
 """The link budget against the paper's table, against numbers computed elsewhere, and against itself turned round."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -343,3 +344,11 @@ def test_an_unknown_convention_is_named():
         gains.pointing_loss_db(1e-6, 0.05, 1.55e-6, "top-hat")
     with pytest.raises(ValueError, match='"linear" is neither'):
         gains.strehl_loss_db(0.4, "linear")
+
+
+@pytest.mark.parametrize(
+    ("each", "all_of_them"), [((True, True), True), ((True, False), False), ((False, False), False), ((), True)]
+)
+def test_links_are_met_where_each_requirement_is(monkeypatch, each, all_of_them):
+    monkeypatch.setattr(requirement, "of_links", lambda study: [SimpleNamespace(met=met) for met in each])
+    assert requirement.met("the study") is all_of_them

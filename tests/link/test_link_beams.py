@@ -12,6 +12,7 @@ from scipy.special import j0, j1, jn_zeros
 
 from microrad.link import gains
 from microrad.link.beams import BEST_TRUNCATION, GaussianFall, LitAperture
+from microrad.mission.fields import Quantity
 from microrad.mission.tables.link import narrowest_radius
 
 D, WAVELENGTH = 0.05, 1.55e-6
@@ -432,3 +433,98 @@ def test_a_refusal_of_a_gain_says_its_numbers(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [(b := LitAperture(0.21, 9.3e-7, 7.5, 0.06, 1.4)).gain_db, b.passed, b.efficiency, b.half_angle_rad],
+     "97.8453457 0.666976811 0.0237147311 2.69954476e-05"),
+    (lambda: LitAperture(0.21, 9.3e-7, 7.5, 0.06, 1.4).loss_db([[0.0, 4e-6], [2.7e-5, 9e-4]]).ravel(),
+     "0 0.191026537 9.7294603 52.9894967"),
+    (lambda: LitAperture(0.21, 9.3e-7, 0.0, 0.4).loss_db([0.0, 3e-6, 1.8e-4, 6.1e-4, 0.3]),
+     "0 6.77122434 58.2736441 71.292035 150.946098"),
+    (lambda: LitAperture(0.21, 9.3e-7, 1.3, 0.4, 2.5).loss_db([-5e-6, 5e-6, 4.4e-4, 9.9e-3]),
+     "2.22470086 2.22470086 61.6054756 97.2704985"),
+    (lambda: [(b := LitAperture(0.21, 9.3e-7, 0.0, 0.4)).gain_db, b.passed, b.efficiency, b.half_angle_rad],
+     "116.260517 1 0.84 3.70194345e-06"),
+    (lambda: [(b := LitAperture(0.21, 9.3e-7, 1e-3, 0.4)).gain_db, b.passed, b.efficiency, b.half_angle_rad],
+     "58.513605 1.67999805e-06 1.41119836e-06 3.70194364e-06"),
+    (lambda: [LitAperture(0.21, 9.3e-7, 1.3, 0.4, 2.5).error_rad(x) for x in (-1.0, 0.0, 5e-7, 2e-6, 0.7, 14.0)],
+     "0 0 2.43121168e-09 4.86242326e-09 2.85418376e-06 1.07706288e-05"),
+    (lambda: [LitAperture(0.21, 9.3e-7, 7.5, 0.06, 1.4).error_rad(x) for x in (3.0, 21.0, 301.0)],
+     "1.56368835e-05 3.58307137e-05 inf"),
+    (lambda: [GaussianFall(7e-6).error_rad(x) for x in (-3.0, 0.0, 8.685889638)], "0 0 7e-06"),
+    (lambda: GaussianFall(7e-6).loss_db([-7e-6, 0.0, 1.4e-5]), "8.68588964 0 34.7435586"),
+    (lambda: [gains.gaussian_pointing_loss_db(x, 5e-6) for x in (0.0, -3e-6, 1e-5)], "0 3.12692027 34.7435586"),
+    (lambda: [gains.pointing_loss_db(2e-6, 0.13, 1.31e-6, each) for each in ("gaussian", "gain")],
+     "0.844224916 1.68844983"),
+    (lambda: [gains.pointing_db_per_rad2(0.13, 1.31e-6, each) for each in ("gain", "gaussian")],
+     "422112458000 211056229000"),
+    (lambda: [gains.strehl_loss_db(0.37, "ratio"), gains.strehl_loss_db(0.37, "decibel"), gains.strehl_loss_db(1.0,
+            "ratio")],
+     "4.31798276 0.37 -0"),
+    (lambda: [gains.strehl_ratio(9e-8, 1.31e-6), gains.strehl_ratio(0.0, 1.31e-6), gains.obscuration_loss_db(0.37)],
+     "0.829992748 1 0.639388834"),
+    (lambda: [gains.air_mass(math.radians(x)) for x in (0.0, 7.0, 90.0, 90.0 + 1e-10)],
+     "37.9196084 7.72811703 0.999711992 0.999711992"),
+    (lambda: [gains.clear_sky_loss_db(0.61, 0.3), gains.clear_sky_loss_db(1.0, 0.3)], "7.19275581 0"),
+    (lambda: [gains.rayleigh_depth(4.3e-7, 1730.0), gains.rayleigh_depth(1.55e-6, -120.0), gains.aerosol_depth(4.3e-7,
+            0.07, 1.6)],
+     "0.21741715 0.00151296821 0.270114881"),
+    (lambda: [gains.aerosol_depth(1e-6, 0.07, 1.6), gains.aerosol_depth(4.3e-7, 0.07, 0.0)], "0.07 0.07"),
+    (lambda: [gains.photon_energy_j(8.3e-7), gains.dbm(3.7e-5), gains.watt(-17.3), gains.watt(0.0), gains.dbm(1.0)],
+     "2.39330826e-19 -14.3179828 1.86208714e-05 0.001 30"),
+    (lambda: [gains.peak_radiant_intensity_w_sr(0.7, 9e-6), gains.implied_transmission_db(2.2e9, 0.7, 9e-6)],
+     "5501652350 -3.98070463"),
+    (lambda: [gains.far_field_m(0.13, 1.31e-6), gains.free_space_loss_db(4.4e7, 1.31e-6), gains.aperture_gain_db(0.13,
+            1.31e-6)],
+     "25801.5267 292.507825 109.876439"),
+])  # fmt: skip
+def test_beams_that_are_cut_hard_or_hardly_at_all_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: LitAperture(0.21, 9.3e-7, 2.6, 0.7),
+     "truncation is 2.6: it must be finite, at most 2.16775; an obscuration of 0.7 stops the rest of the beam"),
+    (lambda: LitAperture(0.21, 9.3e-7, -0.1, 0.0),
+     "LitAperture.truncation is -0.1: it must be finite, at least 0; 0 is an even light"),
+    (lambda: LitAperture(0.21, 9.3e-7, 1.0, 1.0),
+     "LitAperture.obscuration is 1: it must be finite, at least 0 and below 1"),
+    (lambda: LitAperture(0.0, 9.3e-7, 1.0, 0.0), "LitAperture.diameter_m is 0 m: it must be finite, above 0 m"),
+    (lambda: LitAperture(0.21, -9.3e-7, 1.0, 0.0), "LitAperture.wavelength_m is -930 nm: it must be finite, above 0 m"),
+    (lambda: LitAperture(0.21, 9.3e-7, 1.0, 0.0, 0.9),
+     "LitAperture.m_squared is 0.9: it must be finite, at least 1; 1 is an ideal beam"),
+    (lambda: gains.checked("the error", [[1.0], [2.5]], Quantity("rad", most=2.0), "it is small"),
+     "the error is 2.5 rad: it must be finite, at most 2 rad; it is small"),
+    (lambda: gains.checked("the error", [1.0, math.nan], Quantity("rad")), "the error is nan rad: it must be finite"),
+    (lambda: gains.checked("the power", [1.0, 1e-31, 3.0], Quantity("W", above=0.0)),
+     "the power is below 1e-30 W, which nothing is: check unit and scale"),
+    (lambda: gains.checked("the error", [-1.0, 5.0], Quantity("rad", least=0.0, most=2.0)),
+     "the error is -1 rad: it must be finite, at least 0 rad, at most 2 rad"),
+    (lambda: gains.implied_transmission_db(0.0, 0.7, 9e-6),
+     "a peak of 0 W/sr is not above 0 and at most 5.502e+09 W/sr, which 700 mW in a half angle of 9 µrad at 1/e2 "
+     "reach without loss; check the convention of the divergence"),
+    (lambda: gains.implied_transmission_db(5.6e9, 0.7, 9e-6),
+     "a peak of 5.6e+09 W/sr is not above 0 and at most 5.502e+09 W/sr, which 700 mW in a half angle of 9 µrad "
+     "at 1/e2 reach without loss; check the convention of the divergence"),
+    (lambda: gains.air_mass(-0.01), "an elevation of -0.572958 deg is not between 0 and 90 deg, horizon and zenith"),
+    (lambda: gains.air_mass(1.6), "an elevation of 91.6732 deg is not between 0 and 90 deg, horizon and zenith"),
+    (lambda: gains.strehl_loss_db(0.5, "db"), 'Strehl convention "db" is neither "decibel" nor "ratio"'),
+    (lambda: gains.strehl_loss_db(-0.5, "decibel"), "the Strehl loss is -0.5 dB: it must be finite, at least 0 dB"),
+    (lambda: gains.strehl_loss_db(1.01, "ratio"),
+     "the Strehl ratio is 1.01: it must be finite, above 0, at most 1; 1 is a perfect wavefront"),
+    (lambda: gains.pointing_db_per_rad2(0.13, 1.31e-6, "pattern"),
+     'pointing-loss convention "pattern" is neither "gaussian" nor "gain"'),
+    (lambda: gains.obscuration_loss_db(1.0),
+     "the obscuration is 1: it must be finite, at least 0 and below 1; 1 is the whole aperture"),
+    (lambda: gains.obscuration_loss_db(-0.1),
+     "the obscuration is -0.1: it must be finite, at least 0 and below 1; 1 is the whole aperture"),
+    (lambda: gains.clear_sky_loss_db(0.0, 1.0),
+     "the transmission is 0: it must be finite, above 0, at most 1; 1 is vacuum"),
+    (lambda: gains.clear_sky_loss_db(0.5, -0.1),
+     "an elevation of -5.72958 deg is not between 0 and 90 deg, horizon and zenith"),
+])  # fmt: skip
+def test_a_refusal_of_a_beam_or_a_gain_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

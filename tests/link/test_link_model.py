@@ -18,7 +18,9 @@ from microrad import link
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 from microrad.link import beams, gains, receivers
 from microrad.link import study as link_study
+from microrad.link.budget import lines
 from microrad.link.budget.lines import LEFT_AT_ZERO
+from microrad.mission.tables.coupling import Coupling
 
 WAVELENGTH, RATE = 1.55e-6, 300e6
 PHOTON_J = PLANCK_J_S * SPEED_OF_LIGHT_M_S / WAVELENGTH
@@ -653,3 +655,32 @@ def test_the_air_of_its_parts_is_scattering_haze_and_absorption_each_of_which_ma
     assert flat - clean == pytest.approx(0.1 * 10.0 / math.log(10.0) * mass, rel=1e-9)
     assert steep - clean == pytest.approx((flat - clean) * (WAVELENGTH / 1e-6) ** -1.3, rel=1e-9)
     assert wet - clean == pytest.approx(0.4 * mass, rel=1e-9)
+
+
+FEW_MODES = Coupling.model_construct(core_radius_m=12.5e-6, numerical_aperture=0.22)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: lines._cut_by_aperture(31e-6, 0.021, 1.55e-6),
+     "a Gaussian beam this narrow is 31.83 mm wide at 1/e2, and the aperture of 21 mm cuts it: 9.05 dB less gain "
+     "than this, and a wider core"),
+    (lambda: lines._cut_by_aperture(31e-6, 0.057, 1.55e-6),
+     "a Gaussian beam this narrow is 31.83 mm wide at 1/e2, and the aperture of 57 mm cuts it: 0.36 dB less gain "
+     "than this, and a wider core"),
+    (lambda: lines._blocked(0.0), ""),
+    (lambda: lines._blocked(0.125),
+     "the obscuration of 0.125 is not in it: what it stops of the beam belongs into transmit_optics_loss"),
+    (lambda: lines._wide("the error", 0.1), ""),
+    (lambda: lines._wide("the error", 0.12345), "the error of 123 mrad is above 0.1 rad, where small angles end"),
+    (lambda: lines._deep(-20.0), ""),
+    (lambda: lines._deep(20.25), "beyond 20 dB the wings and the scatter of a real beam decide, not this formula"),
+    (lambda: lines._both("", "a", "", "b"), "a; b"),
+    (lambda: lines._few_modes(FEW_MODES, 1.55e-6),
+     "the fibre has V = 11.1, too few modes (below 20) to take all light on its core"),
+    (lambda: lines._few_modes(FEW_MODES, 3.1e-7), ""),
+    (lambda: lines._few_modes(FEW_MODES.model_copy(update={"core_radius_m": None}), 1.55e-6), ""),
+    (lambda: str(lines.given_or_own(1.5, None, "own", "given")), "(1.5, 'own')"),
+    (lambda: str(lines.given_or_own(1.5, 0, "own", "given")), "(0.0, 'given')"),
+])  # fmt: skip
+def test_what_is_doubted_of_a_beam_is_said_with_its_numbers(found, expected):
+    assert found() == expected

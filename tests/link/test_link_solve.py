@@ -278,3 +278,17 @@ def test_a_margin_that_hardly_moves_does_not_move():
     assert len(solve(lambda x: 1e-9 * x).intervals) == 1
     assert solve(lambda _: -math.inf).intervals == ()
     assert solve(lambda _: -math.inf).best_db == -math.inf
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: link_study._no_such_key("answer.power", ["beacon.power", "communication.power", "answer.divergence"]),
+     'no table of the links has a quantity "answer.power"; did you mean beacon.power or communication.power?'),
+    (lambda: link_study._no_such_key("beacon.divergance", ["beacon.divergence", "beacon.power",
+            "terminals.leo_aperture"]),
+     'no table of the links has a quantity "beacon.divergance"; did you mean beacon.divergence or beacon.power?'),
+    (lambda: link_study._no_such_key("x" * 70, ["beacon.divergence", "beacon.power"]),
+     'no table of the links has a quantity "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"; there '
+     "are beacon.divergence, beacon.power"),
+])  # fmt: skip
+def test_a_key_that_is_none_is_answered_with_its_like(found, expected):
+    assert found() == expected

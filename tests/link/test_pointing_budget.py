@@ -614,3 +614,147 @@ def test_a_refusal_of_a_stated_error_says_its_name(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+WORDS = [
+    "random bound radial",
+    "random bound x",
+    "bias 2-sigma radial",
+    "bias 1-sigma x",
+    "drift bound per-axis",
+    "drift 1-sigma radial",
+    "transient bound radial",
+    "transient 3-sigma x",
+]
+EACH = [stated(*each.split(), (11.0 + 7.0 * at) * URAD, f"{each.split()[0]} {at}") for at, each in enumerate(WORDS)]
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [x * 1e6 for one in EACH for x in error_term(one).mean_rad],
+     "0 0 0 0 26.5165043 26.5165043 96 0 19.5 19.5 48.7903679 48.7903679 37.4766594 37.4766594 60 0"),
+    (lambda: [x * 1e6 for one in EACH for x in error_term(one).sigma_rad],
+     "5.5 5.5 10.3923048 0 0 0 0 0 11.2583302 11.2583302 28.169132 28.169132 0 0 0 0"),
+    (lambda: [x * 1e6 for one in EACH for x in error_term(one, "mixed").sigma_rad],
+     "5.5 5.5 10.3923048 0 8.83883476 8.83883476 32 0 13 13 18.7794214 18.7794214 26.5 26.5 20 0"),
+    (lambda: [error_term(one).gaussian for one in EACH], "0 0 1 1 0 0 1 1"),
+    (lambda: [error_term(one, "mixed").gaussian for one in EACH], "0 0 1 1 0 0 0 1"),
+    (lambda: [each.total_rad * 1e6 for each in summation.summations([error_term(one) for one in EACH], 0.683)],
+     "110.181668 202.066679 320.83901 362.035643 49.3165578 334.023616"),
+    (lambda: [each.total_rad * 1e6 for each in summation.summations([error_term(one, "mixed") for one in EACH], 0.5)],
+     "110.181668 202.066679 36.0980693 43.6941485 63.0138984 52.7177597"),
+    (lambda: [x * 1e6 for each in summation.allocate(MIXED, 2.9e-4, rule="ecss-radial", confidence=0.95) for x in
+            (each.largest_rad, each.missing_rad)],
+     "84.5149133 0 138.436022 0 136.436428 0 31.5049711 0"),
+    (lambda: [x * 1e6 for each in summation.allocate(MIXED, 9e-5, rule="rss", confidence=0.95) for x in
+            (each.largest_rad, each.missing_rad)],
+     "0 2.96773634 55.7225269 0 28.3019434 0 0 10.1748471"),
+    (lambda: [x * 1e6 for each in summation.allocate(MIXED, 1.9e-4, rule="esa-1993", confidence=0.95,
+            interpretation="mixed") for x in (each.largest_rad, each.missing_rad)],
+     "45 0 77 0 59 0 21 0"),
+    (lambda: [each.largest_rad * 1e6 for each in summation.allocate(MIXED, 9.5e-5, rule="exact", confidence=0.9,
+            interpretation="mixed")],
+     "53.3429185 91.8381468 153.464054 26.0222146"),
+])  # fmt: skip
+def test_sums_of_errors_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: error_classes.basis(EACH[0]),
+     "random, bound, radial: mean 0, standard deviation error / 2, evenly over a disc over time"),
+    (lambda: error_classes.basis(EACH[1]),
+     "random, bound, about one axis: mean 0, standard deviation error / sqrt(3), evenly up to the bound over time"),
+    (lambda: error_classes.basis(EACH[2]),
+     "bias, 2-sigma, radial: mean 1.5 error / sqrt(2) about each axis, constant; worst-case satellite (temporal)"),
+    (lambda: error_classes.basis(EACH[3]),
+     "bias, 1-sigma, about one axis: mean 3 error, constant; worst-case satellite (temporal)"),
+    (lambda: error_classes.basis(EACH[4]),
+     "drift, bound, about each axis: ramp from zero to error, mean 1/2 and standard deviation 1/sqrt(12) of it; "
+     "worst-case satellite (temporal)"),
+    (lambda: error_classes.basis(EACH[5]),
+     "drift, 1-sigma, radial: ramp from zero to 3 error / sqrt(2) about each axis, mean 1/2 and standard "
+     "deviation 1/sqrt(12) of it; worst-case satellite (temporal)"),
+    (lambda: error_classes.basis(EACH[6]),
+     "transient, bound, radial: mean error / sqrt(2) about each axis, counted as always present; worst-case "
+     "satellite (temporal)"),
+    (lambda: error_classes.basis(EACH[7]),
+     "transient, 3-sigma, about one axis: mean error, counted as always present; worst-case satellite (temporal)"),
+    (lambda: error_classes.basis(EACH[0], "mixed"),
+     "random, bound, radial: mean 0, standard deviation error / 2, evenly over a disc; random satellite at a "
+     "random time (mixed)"),
+    (lambda: error_classes.basis(EACH[1], "mixed"),
+     "random, bound, about one axis: mean 0, standard deviation error / sqrt(3), evenly up to the bound; random "
+     "satellite at a random time (mixed)"),
+    (lambda: error_classes.basis(EACH[2], "mixed"),
+     "bias, 2-sigma, radial: mean 0, standard deviation error / (2 sqrt(2)); random satellite at a random time "
+     "(mixed)"),
+    (lambda: error_classes.basis(EACH[3], "mixed"),
+     "bias, 1-sigma, about one axis: mean 0, standard deviation error / 1; random satellite at a random time "
+     "(mixed)"),
+    (lambda: error_classes.basis(EACH[4], "mixed"),
+     "drift, bound, about each axis: mean 0, standard deviation error / sqrt(3) / sqrt(3), evenly up to the "
+     "bound, ramp from zero; random satellite at a random time (mixed)"),
+    (lambda: error_classes.basis(EACH[5], "mixed"),
+     "drift, 1-sigma, radial: mean 0, standard deviation error / (1 sqrt(2)) / sqrt(3), ramp from zero; random "
+     "satellite at a random time (mixed)"),
+    (lambda: error_classes.basis(EACH[6], "mixed"),
+     "transient, bound, radial: mean 0, standard deviation error / 2, evenly over a disc, counted as always "
+     "present; random satellite at a random time (mixed)"),
+    (lambda: error_classes.basis(EACH[7], "mixed"),
+     "transient, 3-sigma, about one axis: mean 0, standard deviation error / 3, counted as always present; "
+     "random satellite at a random time (mixed)"),
+    (lambda: "; ".join(each.caveat for each in summation.summations([error_term(one, "mixed") for one in EACH], 0.5)),
+     "not authorised: the half widths are not the same number of standard deviations; ECSS-E-ST-60-10C (2008) "
+     "A.2.3: no mathematical justification, can overestimate; not recommended (4.2.3 NOTE 8); approximate: "
+     "transient 6 is not Gaussian and holds more than half of the variance; below the exact radial error, as at "
+     "confidences under 0.79; does not apply: the two standard deviations differ by more than 10 %; approximate: "
+     "transient 6 is not Gaussian and holds more than half of the variance"),
+    (lambda: "; ".join(each.caveat for each in summation.summations([error_term(one) for one in EACH[:2]], 0.9)),
+     "not authorised: the half widths are not the same number of standard deviations; ECSS-E-ST-60-10C (2008) "
+     "A.2.3: no mathematical justification, can overestimate; not recommended (4.2.3 NOTE 8); approximate: "
+     "random 1 is not Gaussian and holds more than half of the variance; approximate: random 1 is not Gaussian "
+     "and holds more than half of the variance; does not apply: the two standard deviations differ by more than "
+     "10 %; approximate: random 1 is not Gaussian and holds more than half of the variance"),
+    (lambda: "; ".join(each.caveat for each in summation.summations([error_term(one) for one in EACH[2:3]], 0.9)),
+     "not authorised: bias 2 has a mean, and means add linearly; ECSS-E-ST-60-10C (2008) A.2.3: no mathematical "
+     "justification, can overestimate; not recommended (4.2.3 NOTE 8); ; ; does not apply: the mean is not 10 "
+     "times below the standard deviation; "),
+    (lambda: "; ".join(each.note for each in summation.allocate(MIXED, 9e-5, rule="rss", confidence=0.95)),
+     "nothing is left: the other lines alone exceed the total by 2.968 µrad; ; ; nothing is left: the other "
+     "lines alone exceed the total by 10.17 µrad"),
+    (lambda: summation.rayleigh_caveat([ErrorTerm("a", "random", 1e-6, (0.0, 0.0), (1e-6, 0.9e-6))]), ""),
+    (lambda: summation.rayleigh_caveat([ErrorTerm("a", "random", 1e-6, (0.0, 0.0), (1e-6, 0.89e-6))]),
+     "does not apply: the two standard deviations differ by more than 10 %"),
+    (lambda: summation.rayleigh_caveat([ErrorTerm("a", "random", 1e-6, (-0.1e-6, 0.0), (1e-6, 0.99e-6))]),
+     "does not apply: the mean is not 10 times below the standard deviation"),
+    (lambda: summation.rayleigh_caveat([ErrorTerm("a", "random", 1.0, (0.25, 0.0), (2.5, 2.5))]), ""),
+])  # fmt: skip
+def test_a_stated_error_says_what_is_taken_for_it(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: stated("random", "bound", "radial", -1e-6, "a"),
+     "a: the error is -1 µrad: it must be finite, at least 0 rad; it is a half width"),
+    (lambda: stated("noise", "bound", "radial", 1e-6, "a"),
+     'a: no kind "noise"; give one of bias, random, drift, transient'),
+    (lambda: stated("random", "4-sigma", "radial", 1e-6, "a"),
+     'a: no statistic "4-sigma"; give one of 1-sigma, 2-sigma, 3-sigma, bound'),
+    (lambda: stated("random", "bound", "y", 1e-6, "a"), 'a: no axes "y"; give one of per-axis, radial, x'),
+    (lambda: error_term(EACH[0], "ensemble"), 'no interpretation "ensemble"; give one of temporal, mixed'),
+    (lambda: ErrorTerm("a", "bias", 1e-6, (0.0,), (0.0, 0.0)),
+     "a: the mean is (0.0,) rad; give two values, for axis x and axis y"),
+    (lambda: ErrorTerm("a", "bias", 1e-6, (0.0, 0.0), (0.0, -1e-6)),
+     "a: the standard deviation is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: ErrorTerm("a", "bias", 1e-6, (0.0, math.nan), (0.0, 0.0)), "a: the mean is nan rad: it must be finite"),
+    (lambda: summation.summations([], 0.9), "the pointing budget has 0 terms; give at least 1"),
+    (lambda: summation.sigma_multiple(1.0), "the confidence is 1: it must be finite, above 0 and below 1"),
+    (lambda: summation.rayleigh_total_rad(TERMS["mixed"], 0.0),
+     "the confidence is 0: it must be finite, above 0 and below 1"),
+    (lambda: summation.exact_total_rad(TERMS["mixed"], 1.5),
+     "the confidence is 1.5: it must be finite, above 0 and below 1"),
+])  # fmt: skip
+def test_a_refusal_of_a_stated_error_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

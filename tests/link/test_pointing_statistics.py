@@ -499,3 +499,132 @@ def test_a_refusal_of_motions_and_fades_says_its_numbers(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+STOOD = pf.MovingEnd(Jitter((0.3e-6, 1.1e-6), (0.0, 1.4e-6)), (0.0, 0.6e-3), 8.0 * URAD)
+
+
+def falling(power):
+    return 0.5 * np.exp(-4.5 * power)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [*(m := pf.motion_of_spectrum([0.0, 1.0, 4.0], [[2e-12, 1e-12, 3e-13], [0.0, 0.0, 0.0]])).rms_rad,
+            *m.top_octave_share],
+     "1.85741756e-06 0 0.768115942 0"),
+    (lambda: [*pf.motion_of_spectrum([6.0, 10.0], [[1e-12, 2e-12], [3e-12, 1e-12]]).top_octave_share], "1 1"),
+    (lambda: pf.level_crossing_rate_hz(Jitter((1e-6, 2e-6), (0.0, 3e-6)), (0.0, 1e-3), [0.5e-6, 1e-6, 4e-6]),
+     "0 0 51.4646313"),
+    (lambda: pf.level_crossing_rate_hz(Jitter((1e-6, 2e-6), (3e-6, 0.0)), (1e-3, 0.0), [1.9e-6, 4e-6]), "0 55.3958744"),
+    (lambda: pf.level_crossing_rate_hz(Jitter((1e-6, 2e-6), (0.0, 0.0)), (0.0, 0.0), [2e-6]), "0"),
+    (lambda: [(f := pf.fades(Jitter((3e-6, 0.0), (0.0, 0.0)), (0.0, 0.0), 9e-6, m)).per_second + f.mean_duration_s +
+            f.share_of_time for m in (0.5, 2.0)],
+     "inf 0"),
+    (lambda: [float((f := pf.fades_of_both(*ENDS[::-1], 3.0)).per_second), float(f.mean_duration_s),
+            float(f.share_of_time)],
+     "78.8807903 0.00172822609 0.13632384"),
+    (lambda: [float((f := pf.fades_of_both(STOOD, ENDS[1], 6.0)).per_second), float(f.mean_duration_s),
+            float(f.share_of_time)],
+     "0.0331418783 0.00141409509 4.68657672e-05"),
+    (lambda: [*STOOD.moved.jitter.rms_rad, *STOOD.moved.velocity_rms_rad_s, STOOD.moved.half_angle_rad],
+     "1.4e-08 1.4e-06 6e-06 0.0006 8e-06"),
+    (lambda: [pf.mean_error_ratio(Jitter((3e-6, 4e-6), (0.0, 0.0)), 9e-6, 2.0, falling)], "0.0106711444"),
+    (lambda: [pf.uncoded_penalty_db(Jitter((3e-6, 4e-6), (0.0, 0.0)), 9e-6, falling),
+            pf.uncoded_penalty_db(Jitter((0.0, 0.0), (0.0, 0.0)), 9e-6, falling)],
+     "2.68083014 0"),
+    (lambda: [pf.penalty_db(np.array([1.5, 0.7]), np.array([0.25, 0.75]), falling), pf.penalty_db(np.array([3.0,
+            2.0]), np.array([0.5, 0.5]), falling)],
+     "1.26488147 0"),
+    (lambda: [(b := ps.best_divergence_for_outage(SKEW, 0.02)).half_angle_rad, b.loss_db, b.gain_db,
+            b.wanted_half_angle_rad, b.at_limit],
+     "1.00600286e-05 4.34294482 104.635971 1.00600286e-05 0"),
+    (lambda: [(b := ps.best_divergence_for_static_error(2e-6, smallest_half_angle_rad=9e-6,
+            current_half_angle_rad=1.1e-5)).gain_db, b.current_excess_db, b.at_limit, b.loss_db],
+     "109.517117 1.60120754 1 0.428932822"),
+    (lambda: [(b := ps.best_divergence_for_static_error(0.0, smallest_half_angle_rad=9e-6)).half_angle_rad, b.loss_db,
+            b.wanted_half_angle_rad],
+     "9e-06 0 0"),
+    (lambda: [ps.mean_loss_db(Jitter((0.0, 0.0), (2e-6, 2e-6)), 7e-6), ps.mean_transmission(Jitter((1e-6, -3e-6),
+            (2e-6, 0.0)), 7e-6)],
+     "1.22717277 0.583098207"),
+    (lambda: [ps.outage_probability(Jitter((0.0, 0.0), (2e-6, 2e-6)), 7e-6, 3.0), ps.outage_loss_db(Jitter((0.0, 0.0),
+            (2e-6, 2e-6)), 7e-6, 0.1)],
+     "0.120572981 3.26530612"),
+    (lambda: ps.transmission([0.0, 7e-6], 7e-6), "1 0.135335283"),
+])  # fmt: skip
+def test_motions_and_fades_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: pf.motion_of_spectrum([1.0], [[1.0], [1.0]]),
+     "frequencies of shape (1,) and spectral densities of shape (2, 1) do not fit; give (freqs,) with at least 2 "
+     "of them, and (2, freqs)"),
+    (lambda: pf.motion_of_spectrum([1.0, 2.0], [[1.0, 1.0]]),
+     "frequencies of shape (2,) and spectral densities of shape (1, 2) do not fit; give (freqs,) with at least 2 "
+     "of them, and (2, freqs)"),
+    (lambda: pf.motion_of_spectrum([1.0, 1.0], [[1.0, 1.0], [1.0, 1.0]]),
+     "the frequencies do not rise from 0 Hz or above; sort them, each once"),
+    (lambda: pf.motion_of_spectrum([-1.0, 1.0], [[1.0, 1.0], [1.0, 1.0]]),
+     "the frequencies do not rise from 0 Hz or above; sort them, each once"),
+    (lambda: pf.motion_of_spectrum([0.0, math.inf], [[1.0, 1.0], [1.0, 1.0]]),
+     "the frequencies do not rise from 0 Hz or above; sort them, each once"),
+    (lambda: pf.motion_of_spectrum([0.0, 1.0], [[1.0, -1.0], [1.0, 1.0]]),
+     "the spectral density is -1 rad^2/Hz: it must be finite, at least 0 rad^2/Hz"),
+    (lambda: pf.level_crossing_rate_hz(SKEW, (0.7e-3, 0.0), 1e-6),
+     "axis y has a jitter rms of 2.1 µrad and a velocity rms of 0 rad/s; give both above 0, or both 0 and the "
+     "standing error as its bias"),
+    (lambda: pf.level_crossing_rate_hz(SKEW, (0.7e-3, -1e-3), 1e-6),
+     "the velocity rms of axis y is -1 mrad/s: it must be finite, at least 0 rad/s"),
+    (lambda: pf.level_crossing_rate_hz(Jitter((0.0, 0.0), (0.0, 1e-6)), (2e-3, 1e-3), 1e-6),
+     "axis x has a jitter rms of 0 rad and a velocity rms of 2 mrad/s; give both above 0, or both 0 and the "
+     "standing error as its bias"),
+    (lambda: pf.level_crossing_rate_hz(SKEW, SPEED, -1e-6),
+     "the radial error is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: pf.mean_error_ratio(SKEW, 9e-6, 0.0, lambda power: power[:3]),
+     "the bit error ratio does not give one value from 0 to 1 for each power; correct the curve"),
+    (lambda: pf.mean_error_ratio(SKEW, 9e-6, 0.0, lambda power: 1.5 - power),
+     "the bit error ratio does not give one value from 0 to 1 for each power; correct the curve"),
+    (lambda: pf.mean_error_ratio(SKEW, 9e-6, 0.0, lambda power: 0.2 + 0.1 * power),
+     "the bit error ratio grows with the power; give a curve that falls"),
+    (lambda: pf.penalty_db(np.ones(1), np.ones(1), lambda power: 0.0 * power),
+     "the bit error ratio at power 1 is 0; it is the target and must be between 0 and 1"),
+    (lambda: pf.penalty_db(np.ones(1), np.ones(1), lambda power: 1.0 + 0.0 * power),
+     "the bit error ratio at power 1 is 1; it is the target and must be between 0 and 1"),
+    (lambda: pf.penalty_db(np.array([1.0, 0.0]), np.array([0.5, 0.5]), falling),
+     "the mean bit error ratio stays above 0.0055545 even with 100 dB more power; widen the beam or reduce the "
+     "jitter"),
+    (lambda: ps.best_divergence_for_static_error(0.0),
+     "the received power grows without end as the beam narrows (half angle 0 rad); give the smallest half angle, "
+     "the diffraction limit of the aperture"),
+    (lambda: ps.best_divergence_for_static_error(-1e-6),
+     "the radial error is -1 µrad: it must be finite, at least 0 rad"),
+    (lambda: ps.best_divergence_for_static_error(1e-6, smallest_half_angle_rad=9e-6, current_half_angle_rad=8e-6),
+     "the current half angle of 8 µrad is below the smallest, 9 µrad; correct one of them"),
+    (lambda: ps.best_divergence_for_static_error(1e-6, current_half_angle_rad=0.0),
+     "the half angle is 0 rad: it must be finite, above 0 rad; it is that of a beam at 1/e^2"),
+    (lambda: ps.best_divergence_for_outage(SKEW, 0.0),
+     "the probability is 0: it must be finite, at least 1e-20 and below 1"),
+    (lambda: ps.radius_of_loss_rad(9e-6, -0.1), "the loss is -0.1 dB: it must be finite, at least 0 dB"),
+    (lambda: ps.transmission(1e-6, 0.0),
+     "the half angle is 0 rad: it must be finite, above 0 rad; it is that of a beam at 1/e^2"),
+    (lambda: ps.mean_loss_db(SKEW, -1e-6),
+     "the half angle is -1 µrad: it must be finite, above 0 rad; it is that of a beam at 1/e^2"),
+])  # fmt: skip
+def test_a_refusal_of_a_motion_or_a_divergence_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: SPECTRUM.warning,
+     "69 % of the velocity variance lies in the octave below 80 Hz: rate and duration of fades hang on where the "
+     "spectrum ends; extend it until it falls faster than 1/f^3, or state the bandwidth that counts"),
+    (lambda: pf.SpectralMotion((1e-6, 1e-6), (1.0, 1.0), (0.1, 0.05), 80.0).warning, ""),
+    (lambda: pf.SpectralMotion((1e-6, 1e-6), (1.0, 1.0), (0.02, 0.126), 1234.5).warning,
+     "13 % of the velocity variance lies in the octave below 1.234 kHz: rate and duration of fades hang on where "
+     "the spectrum ends; extend it until it falls faster than 1/f^3, or state the bandwidth that counts"),
+])  # fmt: skip
+def test_a_spectrum_that_ends_too_early_says_how_much_of_its_motion_that_is(found, expected):
+    assert found() == expected

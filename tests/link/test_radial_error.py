@@ -239,3 +239,37 @@ LINE = Jitter((1.3 * URAD, -2.6 * URAD), (2.1 * URAD, 0.0))
 ])  # fmt: skip
 def test_probabilities_of_axes_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+UPRIGHT = Jitter((-1.2 * URAD, 0.8 * URAD), (0.0, 1.7 * URAD))
+NARROW = Jitter((2.4 * URAD, -0.5 * URAD), (1.9 * URAD, 2e-9 * URAD))
+STILL = Jitter((3.0 * URAD, -4.0 * URAD), (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [*radial_survival(UPRIGHT, [0.0, 1.2e-6, 2e-6, 7e-6]), *radial_cdf(UPRIGHT, [1.2e-6, 2e-6, 7e-6])],
+     "1 1 0.397977032 0.000170815315 0 0.602022968 0.999829185"),
+    (lambda: radial_quantile(UPRIGHT, [[0.5, 1e-12], [0.99, 1e-20]]).ravel(),
+     "1.75323998e-06 1.28151094e-05 1.20023603e-06 1.65894535e-05"),
+    (lambda: [*radial_survival(NARROW, [2e-6, 2.6e-6, 9e-6]), *radial_cdf(NARROW, [2e-6, 2.6e-6])],
+     "0.607599844 0.472809351 0.00026377077 0.392400172 0.527190646"),
+    (lambda: radial_quantile(NARROW, [0.3, 1e-5]), "3.43907788e-06 1.0515187e-05"),
+    (lambda: radial_survival(STILL, [4.9e-6, 5e-6, 5.1e-6]), "1 0 0"),
+    (lambda: radial_cdf(STILL, [4.9e-6, 5e-6, 5.1e-6]), "0 1 1"),
+    (lambda: radial_quantile(STILL, [0.2, 0.9]), "5e-06 5e-06"),
+    (lambda: [(s := radial_steps(UPRIGHT))[0].size, s[0] @ s[1], s[0] ** 2 @ s[1], s[1].sum(), s[0][0], s[0][-1]],
+     "4000 2.04538865e-06 4.96994625e-12 1 2.73027756e-09 2.18394902e-05"),
+    (lambda: [(s := radial_steps(Jitter((0.0, 0.0), (3e-6, 3e-6))))[0].size, s[0] @ s[1], s[0][-1], s[1].sum()],
+     "4000 3.75994241e-06 3.59955e-05 1"),
+    (lambda: radial_survival(Jitter((0.0, 0.0), (3e-6, 3e-6)), [0.0, 4e-6, 1e-4, 1.0]),
+     "1 0.411112291 5.31236408e-242 0"),
+    (lambda: radial_cdf(Jitter((0.0, 0.0), (3e-6, 3e-6)), [0.0, 1e-12, 4e-6, 1.0]), "0 5.55555556e-14 0.588887709 1"),
+    (lambda: radial_survival(Jitter((-8e-6, 8e-6), (2e-6, 2e-6)), [1e-6, 1e-5, 1.3e-5, 2.5e-5]),
+     "0.999999969 0.773788811 0.223512797 5.80057895e-12"),
+    (lambda: radial_cdf(Jitter((-8e-6, 8e-6), (2e-6, 2e-6)), [1e-7, 1e-6, 1e-5]),
+     "1.41991297e-10 3.12242772e-08 0.226211189"),
+    (lambda: [np.sum(x) for x in density_on_circle(Jitter((1e-6, 2e-6), (3e-6, 1e-6)), np.array([2e-6]))],
+     "192 192 216822.083"),
+])  # fmt: skip
+def test_errors_of_one_axis_and_of_hardly_any_have_their_probabilities(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)

@@ -1062,3 +1062,134 @@ def test_a_refusal_of_a_receiver_says_its_numbers(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+PLAIN = {"wavelength_m": 8.1e-7, "bit_error_ratio": 2e-4, "bandwidth_hz": 3e9}
+BARE = {
+    "ook": OokCounting(**PLAIN, detection_efficiency=0.31),
+    "ppm": PpmCounting(**PLAIN, detection_efficiency=0.31, order=64, dark_count_rate_hz=2e4),
+    "gap": PpmCounting(
+        **PLAIN, code_rate=0.4, detection_efficiency=0.31, order=64, dark_count_rate_hz=2e4, code_gap_db=0.8
+    ),
+    "amplified": OokPreamplified(**PLAIN, noise_figure_db=3.0, gain_db=20.0, optical_bandwidth_hz=9e9, code_rate=0.5),
+    "pin": OokPin(**PLAIN, quantum_efficiency=0.6, thermal_noise_a_sqrt_hz=3e-12),
+}
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: BARE["ook"].bit_error_ratio_at([0.0, 1e-12, 4e-11], 2e6), "0.5 0.141251421 5.49392625e-23"),
+    (lambda: BARE["ook"].required_power_w([3e3, 2e6]), "9.28437502e-15 6.18958335e-12"),
+    (lambda: [BARE["ook"].photons_per_bit(2e6), BARE["ook"].net_gain_db(2e6), BARE["ook"].symbol_rate_hz(2e6)],
+     "12.619429 0 2000000"),
+    (lambda: replace(BARE["ook"], background_power_w=3e-4).required_power_w([2e6]), "7.71365125e-08"),
+    (lambda: replace(BARE["ook"], background_power_w=3e-4).bit_error_ratio_at([1e-7, 1.4e-7], 2e6),
+     "2.22473797e-06 6.61726196e-11"),
+    (lambda: BARE["ppm"].bit_error_ratio_at([0.0, 2e-13, 3e-12], 1e6), "0.5 0.119294939 1.52749976e-10"),
+    (lambda: BARE["ppm"].required_power_w([2e4, 3e6]), "2.80869236e-14 3.15263431e-12"),
+    (lambda: [BARE["ppm"].photons_per_bit(1e6), BARE["ppm"].symbol_rate_hz(1e6), BARE["ppm"].highest_data_rate_bit_s],
+     "4.41551808 10666666.7 281250000"),
+    (lambda: [BARE["gap"].net_gain_db(1e6), BARE["gap"].required_power_w(1e6), BARE["gap"].bit_error_ratio_at(6e-13,
+            1e6)],
+     "6.95793808 2.18162234e-13 1.79538866e-10"),
+    (lambda: BARE["gap"].net_gain_db([4e5, 2e6]), "6.87165193 6.99904927"),
+    (lambda: replace(BARE["ppm"], background_power_w=7e-6).required_power_w([1e6]), "7.371098e-10"),
+    (lambda: [BARE["amplified"].highest_data_rate_bit_s, replace(BARE["amplified"],
+            optical_bandwidth_hz=4e9).highest_data_rate_bit_s],
+     "1500000000 1500000000"),
+    (lambda: BARE["amplified"].required_power_w([1e8, 6e8]), "1.47784863e-09 4.69683365e-09"),
+    (lambda: BARE["amplified"].bit_error_ratio_at([0.0, 2e-9], 6e8), "0.5 0.0317394473"),
+    (lambda: replace(BARE["pin"], thermal_noise_a_sqrt_hz=0.0).bit_error_ratio_at([0.0, 1e-9], 6e8),
+     "0.5 0.00214681173"),
+    (lambda: replace(BARE["pin"], thermal_noise_a_sqrt_hz=0.0).required_power_w([6e8]), "1.53669898e-09"),
+    (lambda: [apd_excess_noise_factor(1.0, 0.3), apd_excess_noise_factor(40.0, 0.0), apd_excess_noise_factor(40.0,
+            1.0)],
+     "1 1.975 40"),
+    (lambda: [background_power_w(3e6, 0.02, x, 2e-9) for x in (0.0, 1e-4, math.pi)], "0 9.42477795e-13 0.000376991118"),
+    (lambda: [background_photons_per_mode(0.0, 1e-6), background_photons_per_mode(5e9, 1.31e-6)], "0 0.000161956749"),
+    (lambda: [x.value for x in BARE["ppm"].noise_lines(1e-12, 1e6)], "2.75397894 0 0.0433012702"),
+    (lambda: [x.value for x in BARE["ook"].noise_lines(1e-12, 1e6)], "1.59001048 0 0 0"),
+    (lambda: [x.value for x in BARE["amplified"].noise_lines(1e-9, 1e8)],
+     "2.89374015e-08 0 3.03146045e-08 2.04618329e-09 0 3.03991643e-09"),
+    (lambda: [x.value for x in BARE["pin"].noise_lines(0.0, 1e8)], "0 0 0 0 2.12132034e-08"),
+    (lambda: [x.value for x in KINDS_UNLIKE["dpsk"].noise_lines(3e-9, 1e8)], "13.5834835 1.04094208"),
+    (lambda: [x.value for x in KINDS_UNLIKE["bpsk homodyne"].noise_lines(3e-9, 1e8)], "0.5 0.0877781294"),
+])  # fmt: skip
+def test_receivers_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: "; ".join(f"{x.name}: {x.basis}, {x.unit}, {x.regime}" for x in BARE["pin"].noise_lines(1e-9, 1e8)),
+     "Signal shot noise, marks: sqrt(2 e M^2 F R P B), A, Gaussian noise in 0.5 of the symbol rate; Signal shot "
+     "noise, spaces: sqrt(2 e M^2 F R P B), A, Gaussian noise in 0.5 of the symbol rate; Background shot noise: "
+     "sqrt(2 e M^2 F R P B), A, Gaussian noise in 0.5 of the symbol rate; Dark current shot noise: sqrt(2 e M^2 "
+     "F I B), A, Gaussian noise in 0.5 of the symbol rate; Thermal noise: density sqrt(B), A, Gaussian noise in "
+     "0.5 of the symbol rate"),
+    (lambda: "; ".join(f"{x.name}: {x.basis}, {x.unit}" for x in BARE["ook"].noise_lines(1e-9, 1e8)),
+     "Signal shot noise, marks: sqrt(mean counts in a slot), count; Signal shot noise, spaces: sqrt(mean counts "
+     "in a slot), count; Background shot noise: sqrt(mean counts in a slot), count; Dark counts: sqrt(mean "
+     "counts in a slot), count"),
+    (lambda: "; ".join(f"{x.name}: {x.basis}, {x.unit}" for x in BARE["amplified"].noise_lines(1e-9, 1e8)),
+     "Signal-ASE beat noise, marks: sqrt(4 I S B), S in A/Hz, A; Signal-ASE beat noise, spaces: sqrt(4 I S B), S "
+     "in A/Hz, A; ASE-ASE beat noise: sqrt(2 p S^2 B (Bo - B/2)), S in A/Hz, A; Signal shot noise, marks: sqrt(2 "
+     "e I B), A; Signal shot noise, spaces: sqrt(2 e I B), A; ASE shot noise: sqrt(2 e p S Bo B), S in A/Hz, A"),
+    (lambda: "; ".join(f"{x.name}: {x.basis}, {x.regime}" for x in KINDS_UNLIKE["qpsk homodyne"].noise_lines(1e-9,
+            1e8)),
+     "Shot noise of the local oscillator: 1/2, quadrature of the field, in which the signal is sqrt(q n / 4); "
+     "matched filter; Background beat noise: sqrt(q N / 4), quadrature of the field, in which the signal is "
+     "sqrt(q n / 4); matched filter"),
+])  # fmt: skip
+def test_receivers_without_anything_more_name_the_terms_of_their_noise(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: replace(BARE["ppm"], order=0),
+     "the order of the pulse-position modulation is 0: it is a power of two above 1"),
+    (lambda: replace(BARE["ppm"], order=1),
+     "the order of the pulse-position modulation is 1: it is a power of two above 1"),
+    (lambda: replace(BARE["amplified"], gain_db=9.5),
+     "OokPreamplified.gain_db is 9.5 dB: it must be finite, at least 10 dB; high gain is meant"),
+    (lambda: replace(BARE["amplified"], noise_figure_db=2.9),
+     "OokPreamplified.noise_figure_db is 2.9 dB: it must be finite, at least 3 dB; 3 dB is the quantum limit of "
+     "an amplifier of both quadratures at high gain"),
+    (lambda: replace(BARE["amplified"], polarisations=3),
+     "OokPreamplified.polarisations is 3: it must be finite, at least 1, at most 2"),
+    (lambda: replace(BARE["ook"], extinction_ratio=1.0),
+     "OokCounting.extinction_ratio is 1: it must be finite, above 1; the power of a mark over that of a space "
+     "(inf: dark spaces)"),
+    (lambda: replace(BARE["ook"], bit_error_ratio=0.5),
+     "OokCounting.bit_error_ratio is 0.5: it must be finite, at least 1e-18 and below 0.5; 0.5 is a guess"),
+    (lambda: replace(BARE["ook"], bit_error_ratio=9e-19),
+     "OokCounting.bit_error_ratio is 9e-19: it must be finite, at least 1e-18 and below 0.5; 0.5 is a guess"),
+    (lambda: replace(BARE["ook"], code_rate=0.0), "OokCounting.code_rate is 0: it must be finite, above 0, at most 1"),
+    (lambda: replace(BARE["ook"], code_gain_db=-0.1),
+     "OokCounting.code_gain_db is -0.1 dB: it must be finite, at least 0 dB; a code that costs power is better "
+     "left out"),
+    (lambda: replace(BARE["pin"], quantum_efficiency=1.01),
+     "OokPin.quantum_efficiency is 1.01: it must be finite, above 0, at most 1; one count or electron for each "
+     "photon at the most"),
+    (lambda: replace(BARE["gap"], code_gap_db=-0.5),
+     "PpmCounting.code_gap_db is -0.5 dB: it must be finite, at least 0 dB; no code does with less than capacity"),
+    (lambda: BARE["gap"].required_power_w(1e9),
+     "the data rate is 1 Gbit/s, which is 26.67 GHz of symbols or slots on the line: the receiver takes 3 GHz, "
+     "so at most 112.5 Mbit/s of data"),
+    (lambda: BARE["pin"].noise_lines(-1e-9, 1e8), "the received power is -1 nW: it must be finite, at least 0 W"),
+    (lambda: BARE["pin"].noise_lines(1e-9, 0.0), "the data rate is 0 bit/s: it must be finite, above 0 bit/s"),
+    (lambda: background_photons_per_mode(-1.0, 1e-6),
+     "the spectral radiance is -1 W/(m^2 sr m): it must be finite, at least 0 W/(m^2 sr m)"),
+    (lambda: background_power_w(1.0, 1.0, -0.1, 1.0),
+     "the field of view is -100 mrad: it must be finite, at least 0 rad, at most 3.142 rad; it is the full "
+     "angle, up to pi rad (a half space)"),
+    (lambda: apd_excess_noise_factor(2.0, -0.1),
+     "the ionisation ratio is -0.1: it must be finite, at least 0, at most 1; take the inverse when the other "
+     "carrier starts the avalanche"),
+    (lambda: replace(KINDS_UNLIKE["dpsk"], background_photons_per_mode=-0.1),
+     "DpskPreamplified.background_photons_per_mode is -0.1 photon: it must be finite, at least 0 photon"),
+    (lambda: replace(KINDS_UNLIKE["bpsk homodyne"], phase_error_rad=9.0),
+     "BpskHomodyne.phase_error_rad is 9 rad: it must be finite, at least 0 rad, at most 1 rad"),
+])  # fmt: skip
+def test_a_refusal_of_a_bare_receiver_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

@@ -458,3 +458,23 @@ def test_a_swing_goes_a_tenth_or_half_a_decibel_to_either_side_and_half_way_to_a
 ])  # fmt: skip
 def test_an_input_is_moved_within_its_bounds(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: variation._ends("loss_db", 0.25, Quantity("dB", least=0.0), "ratio"), "0 0.75"),
+    (lambda: variation._ends("strehl", 0.96, Quantity(""), "ratio"), "0.864 1"),
+    (lambda: variation._ends("strehl", 0.96, Quantity("dB", least=0.0), "decibel"), "0.46 1.46"),
+    (lambda: variation._ends("outage", 0.2, Share(""), "ratio"), "0.02 0.6"),
+    (lambda: variation._ends("bit_error_ratio", 1e-18, Share("", least=1e-18, below=0.5), "ratio"), "1e-18 1e-17"),
+    (lambda: variation._ends("height_m", -400.0, Quantity("m", least=-430.0, most=9000.0), "ratio"), "-430 -360"),
+    (lambda: variation._ends("rate", 4.0, Quantity("", above=3.9, most=4.1), "ratio"), "3.95 4.1"),
+    (lambda: [variation._farthest(5, lambda step: step <= 3.25), variation._farthest(-5, lambda step: step >= -9.0),
+            variation._farthest(4, lambda step: step <= 0.0)],
+     "3.25 -5 0"),
+    (lambda: [variation._edge(1.0, 2.0, lambda step: step <= 1.375)], "1.375"),
+    (lambda: [variation.margin_or_none(3.0, lambda of: 2.0 * of), variation.Swing("", "", 0, 0, 0, 1.5, -2.25, "",
+            "").swing_db],
+     "6 3.75"),
+])  # fmt: skip
+def test_inputs_at_their_edges_move_within_these_bounds(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)

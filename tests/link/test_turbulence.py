@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -302,3 +303,116 @@ UNLIKE_FADES = {
 ])  # fmt: skip
 def test_air_of_numbers_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
+
+
+NEAR_AIR = SlantPath(HufnagelValley(2.1e-14, 18.0), 5.3e-7, 0.94, 2.4e5)
+STRONG_AIR = SlantPath(HufnagelValley(6e-13, 45.0, 120.0), 5.3e-7, 0.13, 2.9e6)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [Uplink(NEAR_AIR, waist).index() for waist in (0.2, 0.6, 2.5)], "1.35284129 1.20650397 1.18858776"),
+    (lambda: [Uplink(NEAR_AIR, 0.6).variance(off) for off in (0.0, 0.4, 1.7)], "28.3018393 34.8770448 241.780651"),
+    (lambda: [(up := Uplink(NEAR_AIR, 0.6)).spread_db, up.radius_m, up.wander_rms_rad("andrews-phillips-2005")],
+     "31.9901653 0.603782891 5.24233247e-06"),
+    (lambda: [NEAR_AIR.spherical_rytov, NEAR_AIR.rytov, NEAR_AIR.moment(2.0), NEAR_AIR.moment(-0.5)],
+     "0.279657569 0.287665364 2.75518228e-05 4.31267738e-13"),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz([[4e-7, 2e-6], [900.0, 5e4]], 0.23, UNLIKE_WIND).ravel(),
+     "1.59326192e-08 5.44887912e-09 2.1708161e-21 2.47805734e-31"),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz([3e-7, 700.0, 4e4], 0.31, UNLIKE_WIND, "gradient"),
+     "1.930027e-08 4.73656903e-20 1.81163721e-26"),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz(11.0, 0.31, UNLIKE_WIND).reshape(1), "3.33305348e-14"),
+    (lambda: [Downlink(NEAR_AIR).index(d) for d in (0.0, 0.04, 0.7, 6.0)],
+     "0.270092831 0.143076355 0.000971843041 6.46445856e-06"),
+    (lambda: [Downlink(STRONG_AIR).index(d) for d in (0.0, 0.04, 0.7)], "1.15592041 1.19606861 0.811109491"),
+    (lambda: [STRONG_AIR.rytov, Uplink(STRONG_AIR, 0.02).index(), Downlink(STRONG_AIR).at_point.large],
+     "70.7735321 1.52066983 12.2525132"),
+    (lambda: [Uplink(UNLIKE_AIR, 0.043).anisoplanatic_rad2(x) for x in (0.0, 3e-6)], "0 0.0592514073"),
+    (lambda: HufnagelValley(0.0, 0.0, 0.0).strength([0.0, 1500.0, -200.0]), "2.7e-16 9.93274491e-17 2.7e-16"),
+    (lambda: HufnagelValley(ground_m=-400.0).strength([0.0, 350.0, 500.0]), "1.727e-14 7.83355518e-16 3.67131985e-16"),
+    (lambda: HufnagelValley().strength([[20.0], [9e3]]).ravel(), "1.41848467e-14 1.61314979e-17"),
+    (lambda: [(w := BuftonWind()).rms_m_s, *w.speed_m_s([0.0, 9.4e3, 1.42e4])], "22.9636908 5.64799515 35 16.0363832"),
+    (lambda: BuftonWind(0.0, 0.0, slew_rad_s=2e-3).speed_m_s([0.0, 1e3]), "0 2"),
+    (lambda: [GammaGamma(2.7, 4.3).below(p) - GammaGamma(4.3, 2.7).below(p) for p in (0.01, 1.0)], "0 0"),
+    (lambda: GammaGamma(90.0, 55.0).below([0.0, 0.3, 0.7, 1.0, 1.6, 40.0]),
+     "0 1.75027463e-10 0.0256971138 0.528095868 0.998318814 1"),
+    (lambda: GammaGamma(0.6, 1.1).below([1e-40, 1e-6, 0.02, 3.0, 90.0]),
+     "1.60742737e-24 0.000407824914 0.137383588 0.915049248 0.999999619"),
+    (lambda: [GammaGamma(0.6, 1.1).loss_db(p) for p in (1e-12, 0.04, 0.97)], "203.51431 26.5118544 -7.62138881"),
+    (lambda: [GammaGamma(90.0, 55.0).loss_db(p) for p in (1e-12, 0.04, 0.97)], "5.93283241 1.39315295 -1.3108885"),
+    (lambda: LogNormal(0.0).below([0.99, 1.01]), "0 1"),
+    (lambda: [*LogNormal(2.3).below([0.0, 0.2, 5.0]), LogNormal(2.3).loss_db(0.5), LogNormal(0.0).loss_db(0.01)],
+     "0 0.17706454 0.97827081 2.5925697 0"),
+    (lambda: Wandering(LogNormal(0.09), 0.7).below([[0.0, 1e-3], [0.5, 2.2]]).ravel(),
+     "0 0.00449286272 0.348178659 0.909705629"),
+    (lambda: [Wandering(LogNormal(0.09), 0.7).loss_db(p) for p in (1e-6, 0.3)], "82.1789021 3.93431278"),
+    (lambda: [seeing.residual(n) for n in (2, 4, 6, 8, 9, 10, 11, 12, 13, 14)],
+     "0.582 0.111 0.0648 0.0525 0.0463 0.0401 0.0377 0.0352 0.0319326208 0.0299475853"),
+    (lambda: [seeing.encircled(2e-6, 1.3, 8.1e-7, r0) for r0 in (0.07, 0.4, math.inf)],
+     "0.0682527361 0.755084771 0.937644526"),
+    (lambda: [seeing.encircled(6e-5, 0.07, 8.1e-7, 0.02, tilt_taken_out=tilt) for tilt in (False, True)],
+     "0.890644354 0.907265083"),
+])  # fmt: skip
+def test_air_at_its_edges_has_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: "; ".join(UNLIKE_AIR.regimes), ""),
+    (lambda: "; ".join(STRONG_AIR.regimes),
+     "strong turbulence: the Rytov variance is 70.8, above 0.3; an index is that for any strength (Andrews and "
+     "Phillips), but spread and wander are those of weak turbulence; an elevation of 7.45 deg: below 20 deg the "
+     "air is not flat, and refraction bends the path"),
+    (lambda: "; ".join(replace(UNLIKE_AIR, elevation_rad=math.radians(17.26)).regimes),
+     "moderate turbulence: the Rytov variance is 0.358, above 0.3; an index is that for any strength (Andrews "
+     "and Phillips), but spread and wander are those of weak turbulence; an elevation of 17.3 deg: below 20 deg "
+     "the air is not flat, and refraction bends the path"),
+    (lambda: "; ".join(replace(NEAR_AIR, elevation_rad=math.radians(20.0), wavelength_m=9e-7).regimes),
+     "moderate turbulence: the Rytov variance is 0.749, above 0.3; an index is that for any strength (Andrews "
+     "and Phillips), but spread and wander are those of weak turbulence"),
+    (lambda: "; ".join(replace(NEAR_AIR, elevation_rad=0.6).regimes),
+     "moderate turbulence: the Rytov variance is 0.554, above 0.3; an index is that for any strength (Andrews "
+     "and Phillips), but spread and wander are those of weak turbulence"),
+])  # fmt: skip
+def test_air_beyond_its_closed_forms_is_said_in_words(found, expected):
+    assert found() == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: Downlink(UNLIKE_AIR).arrival_rms_rad(0.0), "the aperture is 0 m: it must be finite, above 0 m"),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz([1.0], -0.2, UNLIKE_WIND),
+     "the aperture is -200 mm: it must be finite, above 0 m"),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz([1.0], 0.2, UNLIKE_WIND, "slope"),
+     'the tilt "slope" is none of zernike, gradient'),
+    (lambda: Downlink(UNLIKE_AIR).variance(-0.2), "the aperture is -200 mm: it must be finite, at least 0 m"),
+    (lambda: Downlink(UNLIKE_AIR).arrival_psd_rad2_hz([1.0], 0.2, BuftonWind(0.0, 0.0)),
+     "the slowest wind is 0 m/s: it must be finite, above 0 m/s; air at rest has no spectrum"),
+    (lambda: Uplink(UNLIKE_AIR, 0.03).wander_rms_rad("dios"),
+     'the convention "dios" is none of dios-2004, itu-r-p1622, andrews-phillips-2005'),
+    (lambda: Uplink(UNLIKE_AIR, 0.0), "Uplink.waist_m is 0 m: it must be finite, above 0 m, at most 100 m"),
+    (lambda: Uplink(UNLIKE_AIR, 101.0), "Uplink.waist_m is 101 m: it must be finite, above 0 m, at most 100 m"),
+    (lambda: replace(UNLIKE_AIR, elevation_rad=math.radians(4.9)),
+     "SlantPath.elevation_rad is 85.52 mrad: it must be finite, at least 87.27 mrad, at most 1.571 rad; lower "
+     "air is not flat"),
+    (lambda: replace(UNLIKE_AIR, range_m=9e4),
+     "SlantPath.range_m is 90 km: it must be finite, at least 100 km, at most 1000000000 km"),
+    (lambda: replace(UNLIKE_AIR, wavelength_m=9e-8),
+     "SlantPath.wavelength_m is 90 nm: it must be finite, at least 100 nm, at most 100 µm"),
+    (lambda: HufnagelValley(ground_m=9001.0),
+     "HufnagelValley.ground_m is 9.001 km: it must be finite, at least -500 m, at most 9 km"),
+    (lambda: HufnagelValley(wind_rms_m_s=200.5),
+     "HufnagelValley.wind_rms_m_s is 200.5 m/s: it must be finite, at least 0 m/s, at most 200 m/s"),
+    (lambda: HufnagelValley(-1e-14), "HufnagelValley.ground_strength is -1e-14: it must be finite, at least 0"),
+    (lambda: BuftonWind(width_m=0.0), "BuftonWind.width_m is 0 m: it must be finite, above 0 m, at most 30 km"),
+    (lambda: BuftonWind(peak_m=3.1e4), "BuftonWind.peak_m is 31 km: it must be finite, at least 0 m, at most 30 km"),
+    (lambda: BuftonWind(slew_rad_s=-0.1),
+     "BuftonWind.slew_rad_s is -100 mrad/s: it must be finite, at least 0 rad/s, at most 1 rad/s"),
+    (lambda: GammaGamma.of_index(0.0), "the scintillation index is 0: it must be finite, above 0"),
+    (lambda: Wandering(LogNormal(0.1), 0.0), "Wandering.beam is 0: it must be finite, above 0"),
+    (lambda: LogNormal(-0.1), "LogNormal.index is -0.1: it must be finite, at least 0"),
+    (lambda: LogNormal(0.2).loss_db(0.0), "the outage is 0: it must be finite, above 0 and below 1"),
+    (lambda: Wandering(LogNormal(0.2), 1.0).loss_db(1.0), "the outage is 1: it must be finite, above 0 and below 1"),
+])  # fmt: skip
+def test_a_refusal_of_air_says_its_numbers_and_bounds(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected

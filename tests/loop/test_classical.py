@@ -1,5 +1,6 @@
 """Families of classical controllers against textbook transfer functions, the saturated loop, and what they refuse."""
 
+import math
 from dataclasses import replace
 
 import control as python_control
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_lyapunov
+from scipy.signal import tf2ss
 
 from design_plants import axis_plant
 from microrad.core import lti
@@ -508,3 +510,84 @@ def test_a_peak_stands_between_rest_and_half_the_rate(freq_hz):
     with pytest.raises(ValueError, match=rf"a peak filter at {freq_hz:g} Hz: a controller with a period of 0.0002 s"):
         filters.peak(freq_hz, 0.05, 1.0, 2e-4)
     assert filters.peak(2499.0, 0.05, 1.0, 2e-4).order == 2
+
+
+# ------------------------------------------------------------------------------------------------ parts by hand
+@pytest.mark.parametrize(("lead_hz", "rise"), [(math.inf, 0.0), (250.0, 1.6), (1e4, 0.04)])
+def test_a_low_pass_with_a_lead_is_exact_at_its_frequency_and_1_at_rest(lead_hz, rise):
+    """At q = i it is (1 + i f / lead) / (2 i damping)."""
+    f, damping, period = 400.0, 0.35, 2e-4
+    s = filters.low_pass(f, damping, period, lead_hz)
+    found = lti.frequency_response(s, np.array([1e-6, f]), period)[:, 0, 0]
+    assert_allclose(found, [1.0, (1.0 + 1j * rise) / (2j * damping)], rtol=1e-6)
+
+
+def test_systems_side_by_side_share_their_input_and_add_their_outputs():
+    each = [filters.notch(300.0, 0.2, 0.5, 2e-4), filters.peak(80.0, 0.01, 2.0 - 1j, 2e-4)]
+    each.append(filters.low_pass(50.0, 1.0, 2e-4))
+    freq = np.array([3.0, 80.0, 310.0, 2000.0])
+    found = lti.frequency_response(filters.parallel(*each), freq, 2e-4)
+    assert_allclose(found, sum(lti.frequency_response(s, freq, 2e-4) for s in each), rtol=1e-9)
+    assert found.shape == (4, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("poles", "zeros", "below", "pairs"),
+    [
+        ([0.999, 0.99, 0.5], [0.998, 0.985, 0.4], 0.05, [(0.999, 0.998), (0.99, 0.985)]),
+        ([0.999, 0.99, 0.5], [0.998, -0.3, 0.4], 0.05, [(0.999, 0.998)]),
+        ([0.999, 0.99], [0.998, 0.985], 1e-3, [(0.999, 0.998)]),
+        ([1.0, 0.99], [0.98, 1.02], 0.05, [(0.99, 0.98)]),
+        ([0.5, 0.2], [0.3, 0.1], 0.05, []),
+    ],
+)
+def test_drift_is_each_slow_real_pole_with_the_zero_of_its_rank(poles, zeros, below, pairs):
+    numerator, denominator = np.poly(zeros), np.poly(poles)
+    A, B, C, D = tf2ss(numerator, denominator)
+    found = classical.drift(lti.StateSpace(A, B, C, D), below)
+    assert found == [(pytest.approx(p, abs=1e-6), pytest.approx(z, abs=1e-6)) for p, z in pairs]
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "around", "least", "band"),
+    [([], 1.5, 0.005, (25.0, 2450.0)), ([700.0], 1.5, 0.005, (700.0 / 1.5, 1050.0)),
+     ([300.0, 1200.0], 4.0, 0.02, (75.0, 2450.0)), ([900.0, 400.0, 600.0], 1.5, 0.1, (400.0 / 1.5, 1350.0))],
+)  # fmt: skip
+def test_filters_are_sought_about_the_resonances_or_over_the_band(monkeypatch, frequencies, around, least, band):
+    found = tuple(classical.Resonance(f, 0.1, 3.0) for f in frequencies)
+    monkeypatch.setattr(classical, "resonances", lambda plant: found)
+    assert classical._band(axis_plant(), around, least) == pytest.approx(band)
+
+
+@pytest.mark.parametrize("which", ["PI", "PID", "PI + notch"])
+def test_bounds_of_a_family_come_from_the_rate_and_the_corner_of_its_plant(which):
+    plant = axis_plant(amplifier_hz=300.0, period_s=1e-3)
+    corner = classical.corner_hz(plant)
+    family = {"PI": classical.PI, "PID": classical.PID, "PI + notch": classical.PI_NOTCH}[which]
+    told = {p.name: (p.unit, p.least, p.most, p.log, p.gentle) for p in family.parameters(plant)}
+    expected = {
+        "integral frequency": ("Hz", 0.01, 250.0, True, None), "zero": ("Hz", 0.1 * corner, 1e4, True, 1e4),
+        "derivative zero": ("Hz", 0.1 * corner, 1e4, True, 1e4), "derivative filter": ("Hz", 20.0, 2000.0, True, None),
+        "notch centre": ("Hz", 5.0, 490.0, True, None), "notch depth": ("", 0.01, 3.0, True, 1.0),
+        "notch width": ("", 0.05, 4.0, True, None),
+    }  # fmt: skip
+    names = {"PI": [0, 1], "PID": [0, 1, 2, 3], "PI + notch": [0, 1, 4, 5, 6]}[which]
+    assert [*told] == [[*expected][i] for i in names]
+    for name, (unit, least, most, log, gentle) in told.items():
+        assert (unit, log) == (expected[name][0], expected[name][3])
+        assert (least, most) == (pytest.approx(expected[name][1]), pytest.approx(expected[name][2]))
+        assert gentle == (expected[name][4] and pytest.approx(expected[name][4]))
+    base = np.array([30.0, 500.0])
+    more = {"PI": [], "PID": [1e4, 20.0], "PI + notch": [5.0, 1.0, 0.05]}[which]
+    assert family.extended(plant, base).tolist() == pytest.approx([30.0, 500.0, *more])
+    assert (family.base and family.base.name) == (None if which == "PI" else "PI")
+
+
+def test_what_follows_the_command_is_the_predictor_of_the_states_by_white_noise_in_error():
+    integral = lti.StateSpace(*(np.array([[x]]) for x in (1.0, 0.3, 1.0, 0.7)))
+    s = filters.parallel(filters.peak(80.0, 0.01, 2.0 - 1j, 2e-4), integral)
+    P = np.eye(3)
+    for _ in range(20_000):
+        K = s.A @ P @ s.C.T / (s.C @ P @ s.C.T + 0.49)
+        P = s.A @ P @ s.A.T + s.B @ s.B.T - K @ s.C @ P @ s.A.T
+    assert_allclose(classical.follow_command(s), K, rtol=1e-6)

@@ -5,7 +5,7 @@ import math
 import os
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,16 +15,18 @@ from numpy.testing import assert_allclose
 from microrad import mirror
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs, parts, promises, results, scenario
-from microrad.loop.disturbance import Misalignment
+from microrad.loop.disturbance import NO_REFERENCE, Misalignment, Reference
 from microrad.loop.pointing_loop import ensemble, traces
-from microrad.loop.pointing_loop.design import design_plant
+from microrad.loop.pointing_loop.design import behind_filter, design_plant
 from microrad.loop.pointing_loop.linear import close, stationary
-from microrad.loop.pointing_loop.loop import assemble
-from microrad.mirror import hysteresis
+from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble
+from microrad.loop.sensor import OpticalSensor, StrainGauge
+from microrad.mirror import Variant, hysteresis
 from microrad.mirror import spread as mirror_spread
-from microrad.mission.file import load_mission
+from microrad.mirror.geometry import Geometry
+from microrad.mission.file import NamedFile, load_mission
 from microrad.mission.model import Source
-from microrad.mission.tables.fine_pointing import MisalignmentTable, WheelsTable
+from microrad.mission.tables.fine_pointing import MisalignmentTable, QuadCellTable, WheelsTable
 from scenes import scene_of
 from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped
@@ -565,3 +567,444 @@ def test_designs_are_plain_data_for_other_tools(scene, tuned):
         assert_allclose(again["matrices"]["A"], d.controller.system.A)
         assert again["margins"]["modulus"] >= 0.5
     assert tuple(scene.mirrors.own) == ("given", "comparison", "no hysteresis")
+
+
+# ------------------------------------------------------------------------------------------------ by parts and numbers
+def rich(scene):
+    """The scene's loop with every part that can be left out."""
+    own = scene.loop
+    return replace(
+        own, drive=replace(own.drive, drive_resolution_v=2e-4, slew_v_s=300.0, sensor_resolution_rad=3e-9),
+        optical=OpticalSensor(2e-6, 1e-3, 5e-9, 2, 3), gauge=StrainGauge(4e-7, 7e-9),
+        references=(Reference(7e-6, 1e-6, 0.3), Reference(2e-6, 3e-6, 0.4)),
+        unknown=(Misalignment(1e-6, 0.0), Misalignment(0.0, 2e-6)), timing=control.Timing(2e-4, 5, 4),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "changed"),
+    [
+        (parts.REFERENCE, {"references": (NO_REFERENCE, NO_REFERENCE)}),
+        (parts.MISALIGNMENT, {"unknown": ()}),
+        (parts.OPTICAL_NOISE, {"optical": OpticalSensor(0.0, 1e-3, 5e-9, 2, 3)}),
+        (parts.GAUGE_NOISE, {"gauge": StrainGauge(0.0, 7e-9)}),
+        (parts.QUANTISATION, {"optical": OpticalSensor(2e-6, 1e-3, 0.0, 2, 3), "gauge": StrainGauge(4e-7, 0.0),
+                              "drive": control.Drive(-6.0, 6.0, 1e3, 300.0, 0.0, 3e-9)}),
+        (parts.LIMITS, {"optical": OpticalSensor(2e-6, math.inf, 5e-9, 2, 3),
+                        "drive": control.Drive(-math.inf, math.inf, 1e3, math.inf, 2e-4, 3e-9)}),
+        (parts.DELAY, {"optical": OpticalSensor(2e-6, 1e-3, 5e-9, 2, 0), "timing": control.Timing(2e-4, 5, 0)}),
+    ],
+)  # fmt: skip
+def test_what_a_part_is_made_of_is_left_out_and_nothing_else(scene, name, changed):
+    loop = rich(scene)
+    found = parts.without(loop, name)
+    for field in fields(loop):
+        own = getattr(found, field.name)
+        assert own == changed[field.name] if field.name in changed else own is getattr(loop, field.name), field.name
+    assert parts.without(loop, "OLYMPUS", name, "body pointing").disturbances == ((), ())
+
+
+def test_a_loop_without_gauge_and_misalignment_has_no_such_source_and_can_be_without_them(scene):
+    loop = replace(rich(scene), gauge=None, unknown=(), disturbances=(scene.loop.disturbances[0][1:], ()))
+    assert parts.sources(loop) == ("body pointing", "optical sensor noise", "reference")
+    assert parts.sources(rich(scene)) == (
+        "OLYMPUS", "body pointing", "optical sensor noise", "gauge noise", "misalignment", "reference",
+    )  # fmt: skip
+    assert parts.without(loop, parts.GAUGE_NOISE).gauge is parts.without(loop, parts.QUANTISATION).gauge is None
+    assert [[d.name for d in axis] for axis in parts.without(loop, "body pointing").disturbances] == [[], []]
+    with pytest.raises(ValueError) as refused:
+        parts.without(rich(scene), parts.DELAY, "Olympus")
+    assert str(refused.value) == (
+        "the loop has no part 'Olympus'; it has reference, misalignment, optical sensor noise, gauge noise, "
+        "quantisation, limits, hysteresis, computation delay, OLYMPUS, body pointing"
+    )
+
+
+@pytest.mark.parametrize(
+    ("linear", "left", "times", "holds", "marks"),
+    [
+        (2.0, 3.0, 1.5, True, ["", ""]),
+        (2.0, 3.0001, 1.50005, False, ["refused", "accepted"]),
+        (4.0, 1.0, 0.25, True, ["", ""]),
+    ],
+)
+def test_a_linear_figure_is_a_promise_up_to_one_and_a_half_times_it(linear, left, times, holds, marks):
+    found = controller_study.Outlook(linear, left)
+    assert (found.times, found.holds) == (pytest.approx(times), holds)
+    assert [found.mark(accept) for accept in (False, True)] == marks
+
+
+def budget_of(sizes, differences=(), full=5.0):
+    made = tuple(controller_study.Part(name, rms, 0.0) for name, rms in sizes.items())
+    left = tuple(controller_study.Difference(*each) for each in differences)
+    return controller_study.ErrorBudget("PI", made, 4.0, full, left)
+
+
+@pytest.mark.parametrize(
+    ("differences", "dominant"),
+    [
+        ((), "wheel"),
+        ([("hysteresis", 5.0, 2.9)], "hysteresis"),
+        ([("hysteresis", 5.0, 3.1)], "wheel"),
+        ([("limits", 5.0, 9.0), (parts.DELAY, 5.0, 0.0)], "wheel"),
+        ([("quantisation", 5.0, 0.0), ("limits", 5.0, 1.0)], "quantisation"),
+    ],
+)
+def test_what_dominates_a_budget_is_its_largest_part_or_what_adds_more_than_each(differences, dominant):
+    assert budget_of({"body": 3.0, "wheel": 4.0, "noise": 1.0}, differences).dominant == dominant
+
+
+@pytest.mark.parametrize(
+    ("full", "linear"), [(5.0, True), (4.5456, True), (4.545, False), (5.555, True), (5.556, False)]
+)
+def test_parts_are_those_of_a_linear_loop_within_a_tenth_of_the_whole(full, linear):
+    budget = budget_of({"body": 3.0, "wheel": 4.0}, full=full)
+    assert (budget.combined_rad, budget.linear) == (pytest.approx(5.0), linear)
+
+
+@pytest.mark.parametrize(("given", "without", "added"), [(5.0, 3.0, 4.0), (3.0, 5.0, -4.0), (2.0, 2.0, 0.0)])
+def test_what_a_part_adds_is_the_root_of_a_difference_of_squares_with_its_sign(given, without, added):
+    assert controller_study.Difference("a", given, without).added_rad == pytest.approx(added)
+
+
+def verified(name, quantile, straight=9.0):
+    simulated = {Variant.GIVEN: SimpleNamespace(quantile_rad=quantile, rms_rad=5.0)}
+    simulated |= {Variant.STRAIGHT: SimpleNamespace(quantile_rad=straight, rms_rad=4.0)}
+    return results.Verified(SimpleNamespace(name=name, controller=name), None, simulated, None, None)
+
+
+def test_the_best_leaves_the_least_quantile_on_the_missions_mirror_whatever_the_baseline_leaves():
+    made = [
+        verified(controller_study.BASELINE, 1.0, 1.0),
+        verified("a", 4.0, 2.0),
+        verified("b", 3.0),
+        verified("c", 3.5),
+    ]
+    assert controller_study.best(made) is made[2]
+    assert [made[1].meets(4.0), made[1].meets(3.999), made[1].meets(3.0, Variant.STRAIGHT)] == [True, False, True]
+
+
+def test_an_error_budget_leaves_every_other_source_out_and_then_each_of_the_rest(scene, monkeypatch):
+    """A loop stands for its runs: told by what it still has."""
+    cases, said = [], []
+
+    def simulate_cases(given, span, runs, told):
+        cases.extend(given)
+        told(3, 7)
+        assert (span, runs) == (results.span(scene.table), scene.table.runs)
+        return [SimpleNamespace(radial_rms_rad=float(k)) for k in range(len(given))]
+
+    monkeypatch.setattr(ensemble, "simulate_cases", simulate_cases)
+    monkeypatch.setattr(results, "for_mirror", lambda controller, loop: controller)
+    theory = SimpleNamespace(error_by_source={"OLYMPUS": np.array([9.0, 16.0]), "gauge noise": np.array([0.0, 4.0])})
+    found = results.error_budget(scene, replace(verified("LQG", 1.0), theory=theory), lambda *each: said.append(each))
+    names = ("OLYMPUS", "body pointing", "optical sensor noise", "gauge noise", "reference")
+    assert [(p.name, p.rms_rad) for p in found.parts] == [(name, float(k)) for k, name in enumerate(names)]
+    assert [p.theory_rad for p in found.parts] == pytest.approx([5.0, math.nan, math.nan, 2.0, math.nan], nan_ok=True)
+    assert [(d.name, d.with_rad, d.without_rad) for d in found.differences] == [
+        ("hysteresis", 5.0, 4.0), ("limits", 5.0, 5.0), ("quantisation", 5.0, 6.0), ("computation delay", 5.0, 7.0),
+    ]  # fmt: skip
+    assert (found.controller, found.full_rad, found.together_rad, said) == ("LQG", 5.0, 4.0, [(3, 7, "error budget")])
+
+    def has(loop):
+        noises = [loop.optical.noise_rad, loop.gauge.noise_rad, loop.references[0].point_ahead_rad]
+        left = [d.name for d in loop.disturbances[1]]
+        return [name for name, size in zip(names, [n in left for n in names[:2]] + noises, strict=True) if size]
+
+    assert [has(c.loop) for c in cases] == [[name] for name in names] + [[*names]] * 3
+    assert [c.loop.mirror.bank == scene.loop.mirror.bank for c in cases] == [False] * 5 + [True] * 3
+    assert [c.loop.drive.drive_resolution_v > 0.0 for c in cases] == [False] * 5 + [True, False, True]
+    assert [c.loop.optical.field_of_view_rad < math.inf for c in cases] == [True] * 5 + [False, True, True]
+    assert [c.loop.timing.delay_steps for c in cases] == [5] * 7 + [0]
+    assert not any(c.spectrum for c in cases)
+
+
+def test_sines_are_tracked_on_x_by_each_design_on_each_mirror_with_hysteresis_beside_the_fast_disturbances(
+    scene, monkeypatch
+):
+    cases = []
+
+    def simulate_cases(given, span, runs, told):
+        cases.extend(given)
+        told(1, 2)
+        assert (span, runs) == (ensemble.Span(1.4, 0.4, scene.table.seed), 64)
+        return [
+            SimpleNamespace(radial_rms_rad=k, quantile_rad=lambda share, k=k: (k, share)) for k in range(len(given))
+        ]
+
+    monkeypatch.setattr(ensemble, "simulate_cases", simulate_cases)
+    monkeypatch.setattr(results, "for_mirror", lambda controller, loop: controller)
+    table = scene.table.model_copy(update={"quantile": 0.75})
+    here, said = replace(scene, table=table, sine_amplitude_rad=3e-5, sine_frequencies_hz=(2.0, 7.0)), []
+    found = results.sines(here, [verified(n, 1.0).design for n in "AB"], lambda *each: said.append(each))
+    variants = [v for v in here.has if v != Variant.STRAIGHT]
+    told = [(name, variant, freq) for variant in variants for name in "AB" for freq in (2.0, 7.0)]
+    assert said == [(1, 2, "sines under vibration and noise")]
+    assert [(s.controller, s.variant, s.freq_hz) for s in found] == told
+    assert [(s.rms_rad, s.quantile_rad) for s in found] == [(k, (k, 0.75)) for k in range(len(told))]
+    for (name, variant, freq), case in zip(told, cases, strict=True):
+        assert case.controller == name
+        assert [r.sine_amplitude_rad for r in case.loop.references] == [3e-5, 0.0]
+        assert case.loop.references[0].at(np.array([0.25 / freq])) == pytest.approx([3e-5], rel=1e-12)
+        assert [[d.name for d in axis] for axis in case.loop.disturbances] == [["OLYMPUS"]] * 2
+        assert case.loop.mirror.bank == here.on(variant).mirror.bank
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "settle_s", "runs", "lasts_s", "has"),
+    [(9.0, 0.5, 500, 1.0, 64), (0.8, 0.5, 500, 0.8, 64), (9.0, 2.0, 12, 2.5, 12)],
+)
+def test_an_outlook_takes_few_short_runs_and_holds_an_axis_against_its_linear_figure(
+    scene, monkeypatch, duration_s, settle_s, runs, lasts_s, has
+):
+    asked = []
+
+    def simulate_cases(given, span, runs, told):
+        asked.append((span, runs, [c.controller for c in given]))
+        return [SimpleNamespace(radial_rms_rad=6.0 * (k + 1)) for k in range(len(given))]
+
+    monkeypatch.setattr(ensemble, "simulate_cases", simulate_cases)
+    monkeypatch.setattr(results, "for_mirror", lambda controller, loop: controller)
+    table = scene.table.model_copy(update={"duration_s": duration_s, "settle_s": settle_s, "runs": runs, "seed": 23})
+    made = [
+        SimpleNamespace(controller=n, tuned=SimpleNamespace(residual_rms_rad=v)) for n, v in (("a", 4.0), ("b", 9.0))
+    ]
+    found = results.outlook(replace(scene, table=table), made)
+    assert asked == [(ensemble.Span(pytest.approx(lasts_s), settle_s, 23), has, ["a", "b"])]
+    assert [(o.linear_rad, o.simulated_rad) for o in found] == [
+        (4.0, pytest.approx(6.0 / math.sqrt(2))), (9.0, pytest.approx(12.0 / math.sqrt(2))),
+    ]  # fmt: skip
+
+
+def test_a_record_of_runs_has_their_numbers_by_axis_and_the_limits_that_were_met():
+    counters = dict.fromkeys(ensemble.COUNTERS.values(), 0.0)
+    names = [*ensemble.COUNTERS]
+    counters |= {ensemble.COUNTERS[names[1]]: 0.25, ensemble.COUNTERS[names[4]]: 1.5}
+    run = SimpleNamespace(
+        radial_rms_rad=3.0, radial_rms_interval_rad=lambda: 0.2, axis_rms_rad=np.array([1.0, 2.5]),
+        mean_rad=np.array([[1.0, -2.0], [2.0, 0.0], [6.0, -1.0]]),
+        histogram=np.array([[1, 2], [3, 0], [4, 7]], np.int32), largest_rad=np.array([5.0, 8.0, 7.0]),
+        share=counters.get, quantile_rad=lambda share: 10.0 * share,
+    )  # fmt: skip
+    found = results.residual(run, 0.6)
+    assert (found.rms_rad, found.rms_interval_rad, found.axis_rms_rad) == (3.0, 0.2, (1.0, 2.5))
+    assert found.axis_mean_rad == pytest.approx((3.0, -1.0))
+    assert (found.radial_counts.tolist(), found.radial_counts.dtype) == ([8, 9], np.int64)
+    assert (found.quantile_rad, found.largest_rad) == (pytest.approx(6.0), 8.0)
+    assert found.shares == {names[1]: 0.25, names[4]: 1.5}
+
+
+@pytest.mark.parametrize(
+    ("wanted", "groups"),
+    [
+        (["PI + notch", "LQG", "PI", "disturbance observer"],
+         [["LQG"], ["PI", "PI + notch"], ["disturbance observer"]]),
+        (["PI + inverse", "resonant damping", "PI"], [["PI + inverse", "PI"], ["resonant damping"]]),
+        (["PI + inverse in series", "PI + notch"], [["PI + notch"], ["PI + inverse in series"]]),
+        (["LQG"], [["LQG"]]), ([], []), (["PI, best of a gain grid", "PI"], [["PI"], ["PI, best of a gain grid"]]),
+    ],
+)  # fmt: skip
+def test_what_begins_with_the_pi_is_tuned_in_one_process_behind_what_takes_longest(scene, wanted, groups):
+    assert designs._groups(wanted, scene.table) == groups
+
+
+def test_in_a_group_the_pi_is_tuned_once_and_handed_on():
+    calls = []
+
+    def tuning(name):
+        return lambda base=None: calls.append((name, base)) or f"tuned {name}"
+
+    group = {name: tuning(name) for name in ("PI + inverse", "PI", "PI + notch")}
+    assert designs._tuned_in_turn(group) == {
+        "PI + inverse": "tuned PI + inverse", "PI": "tuned PI", "PI + notch": "tuned PI + notch"
+    }  # fmt: skip
+    assert calls == [("PI + inverse", None), ("PI", "tuned PI + inverse"), ("PI + notch", "tuned PI + inverse")]
+    calls.clear()
+    found = designs._tuned_in_turn({name: tuning(name) for name in ("PI", "PI + inverse", "PI + notch")})
+    assert found["PI + inverse"] == "tuned PI"
+    assert calls == [("PI", None), ("PI + notch", "tuned PI")]
+    calls.clear()
+    assert designs._tuned_in_turn({"PI + notch": tuning("PI + notch"), "LQG": tuning("LQG")})["LQG"] == "tuned LQG"
+    assert calls == [("PI + notch", None), ("LQG", None)]
+
+
+ALL = (
+    "PI, best of a gain grid", "PI", "PI + inverse", "PI + notch", "resonant damping", "disturbance observer", "LQG",
+    "PI + peaks", "PI + inverse in series",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("gauge", "wheels", "without"), [(True, True, ()), (False, True, (4,)), (True, False, (7,)), (False, False, (4, 7))]
+)
+def test_controllers_are_those_that_fit_the_sensors_and_lines_in_their_order(file, gauge, wheels, without):
+    f = file.mission.fine_pointing
+    given = {"speed": "80 Hz", "harmonics": [1.0], "coefficients": ["1e-12 rad/Hz^2"], "convention": "per-axis"}
+    table = f.model_copy(update={
+        "strain_gauge": f.strain_gauge if gauge else None,
+        "wheels": WheelsTable.model_validate(given) if wheels else None,
+    })  # fmt: skip
+    names = tuple(name for i, name in enumerate(ALL) if i not in without)
+    assert designs.names(table) == designs.offered(table, file.mission.mirror) == names
+    with pytest.raises(ValueError) as refused:
+        designs.tune("PID", table, [])
+    assert str(refused.value) == f"'PID' is no controller of this mission; it has {', '.join(names)}"
+
+
+@pytest.mark.parametrize(
+    ("name", "inverse", "targets"),
+    [("LQG", False, 0), ("PI + notch", False, 0), ("PI + inverse", True, 2), ("PI + inverse in series", True, 2)],
+)
+def test_a_controller_has_an_inverse_where_its_name_says_so(scene, name, inverse, targets):
+    axis = control.PI.build(design_plant(scene.axis), np.array([60.0, 1500.0]))
+    made, alone = (designs.build(name, where, axis) for where in (scene, replace(scene, loop=scene.axis)))
+    assert (made.name, made.inverse is not None, made.adaptation) == (name, inverse, None)
+    assert [len(each.system.C) for each in (made, alone)] == [2 + 2 * targets, 1 + targets]
+    volts = made.system.D[:2, :2]
+    assert np.any(volts != 0.0) == (name != "PI + inverse in series")
+    tuned = SimpleNamespace(controller=axis, values={"a": 1.0}, bound_by=("b",), margins="c")
+    design = designs.Design(name, tuned, made)
+    assert (design.values, design.bound_by, design.loop_margins) == ({"a": 1.0}, ("b",), "c")
+    again = designs.on_one_axis(design, scene)
+    assert all(np.array_equal(getattr(again.system, key), getattr(alone.system, key)) for key in "ABCD")
+
+
+@pytest.mark.parametrize("uncertain", [False, True])
+def test_plants_are_the_nominal_one_and_one_for_each_mirror_that_is_drawn(scene, monkeypatch, uncertain):
+    asked = []
+    table = scene.mirrors.table.model_copy(update={"uncertainty": object() if uncertain else None})
+    drawn = ("first", "second")
+    monkeypatch.setattr(designs.spread, "draws", lambda of, count, seed: asked.append((of, count, seed)) or drawn)
+    monkeypatch.setattr(designs, "from_table", lambda of: f"mirror {of}")
+    monkeypatch.setattr(designs, "design_plant", lambda loop: loop.mirror)
+    found = designs.plants(replace(scene, mirrors=SimpleNamespace(table=table)), 11)
+    assert found == ((scene.axis.mirror, *(("mirror first", "mirror second") if uncertain else ())))
+    assert asked == ([(table, 8, 11)] if uncertain else [])
+
+
+def test_what_an_inverse_in_series_is_tuned_for_has_its_filter_in_the_way_on_each_plant(scene, monkeypatch):
+    asked = []
+    monkeypatch.setattr(control, "tune", lambda family, of, wanted, seed: asked.append((family, of, wanted, seed)))
+    table = scene.table.model_copy(update={"reference_filter_hz": 321.0, "seed": 6, "modulus_margin": 0.45})
+    plant = design_plant(scene.axis)
+    for name in ("PI + inverse in series", "PI + adaptive inverse in series"):
+        designs._tuning(name, table, [plant, plant])()
+    path = ReferenceFilter(321.0).discrete(plant.period_s)
+    wanted = behind_filter(plant, path).system
+    for family, of, specification, seed in asked:
+        assert (family, specification, seed) == (control.PI, control.Specification(0.45), 6)
+        assert [np.array_equal(p.system.A, wanted.A) and np.array_equal(p.system.B, wanted.B) for p in of] == [True] * 2
+    assert len(asked) == 2
+
+
+def test_the_baseline_is_the_best_of_24_values_of_either_gain_from_bound_to_bound(scene, monkeypatch):
+    asked = []
+    monkeypatch.setattr(control, "grid_best", lambda *each: asked.append(each) or "best")
+    plant = design_plant(scene.axis)
+    assert designs.grid_baseline([plant, "other"], "wanted") == "best"
+    ((family, of, wanted, grid),) = asked
+    assert (family, of, wanted, [len(row) for row in grid]) == (control.PI, [plant, "other"], "wanted", [24, 24])
+    for row, p in zip(grid, control.PI.parameters(plant), strict=True):
+        assert row == pytest.approx(p.least * (p.most / p.least) ** (np.arange(24) / 23), rel=6e-4)
+        assert row == [control.rounded(v) for v in row]
+
+
+def test_the_optimum_is_lqg_at_no_price(scene, monkeypatch):
+    asked = []
+    monkeypatch.setattr(control, "lqg_controller", lambda plant, weights: asked.append(weights) or "free")
+    monkeypatch.setattr(control, "by_source", lambda plant, made: {"a": 9.0, "b": 16.0} if made == "free" else {})
+    assert designs.optimum_rms_rad(scene.axis) == pytest.approx(5.0)
+    assert asked == [control.Weights(1e-6, 1.0, 0.0, 0.0)]
+
+
+# ------------------------------------------------------------------------------------------------ from the mission
+def of_table(file, **changes):
+    """The mission's fine-pointing table with some numbers of its tables changed."""
+    f = file.mission.fine_pointing
+    for name, update in changes.items():
+        f = f.model_copy(update={name: getattr(f, name).model_copy(update=update)})
+    return f
+
+
+@pytest.mark.parametrize(
+    ("on_mirror", "feedforward", "ahead", "rate"),
+    [(True, 0.75, 31e-6, 2e-6), (False, 0.75, 0.0, 2e-6), (True, 1.0, 31e-6, 0.0), (False, 0.0, 0.0, 8e-6)],
+)
+def test_the_reference_of_x_is_the_point_ahead_and_the_rate_that_is_not_fed_forward(
+    file, on_mirror, feedforward, ahead, rate
+):
+    changed = {"point_ahead_rad": 31e-6, "point_ahead_on_mirror": on_mirror, "line_of_sight_rate_rad_s": 8e-6,
+               "rate_feedforward": feedforward}  # fmt: skip
+    x, y = scenario.references(of_table(file, reference=changed, body={"bandwidth_hz": 0.7}))
+    assert (x.point_ahead_rad, x.line_of_sight_rate_rad_s, x.body_bandwidth_hz) == pytest.approx((ahead, rate, 0.7))
+    assert y == Reference(0.0, 0.0, 0.7)
+
+
+@pytest.mark.parametrize(("convention", "share"), [("radial", math.sqrt(0.5)), ("per-axis", 1.0)])
+@pytest.mark.parametrize("on_mirror", [True, False])
+def test_what_a_mirror_has_to_follow_is_body_lag_bias_and_misalignment_by_axis(file, convention, share, on_mirror):
+    misaligned = MisalignmentTable.model_validate(
+        {"offset": ["-20 urad", "5 urad"], "drift": ["3 urad/s", "-7 urad/s"]}
+    )
+    f = of_table(
+        file, body={"error_rad": 120e-6, "convention": convention, "bandwidth_hz": 0.5},
+        reference={"point_ahead_rad": 40e-6, "line_of_sight_rate_rad_s": 90e-6, "rate_feedforward": 0.9},
+    ).model_copy(update={"misalignment": misaligned, "duration_s": 2.0})  # fmt: skip
+    found = scenario.demand(f, SimpleNamespace(bias_rad=17e-6), on_mirror)
+    assert found.body_pointing_rad == pytest.approx((120e-6 * share,) * 2)
+    assert found.point_ahead_rad == (40e-6, 0.0)
+    assert found.bias_rad == pytest.approx((17e-6 + 26e-6, 17e-6 + 19e-6))
+    assert found.rate_lag_rad == pytest.approx((9e-6 / math.pi, 0.0))
+    assert found.point_ahead_on_mirror is on_mirror
+    plain = scenario.demand(f.model_copy(update={"misalignment": None}), SimpleNamespace(bias_rad=17e-6), on_mirror)
+    assert plain.bias_rad == (17e-6, 17e-6)
+
+
+@pytest.mark.parametrize("kind", ["first-order", "bands", "table", "olympus"])
+def test_a_vibration_is_that_of_its_table_in_its_convention(file, tmp_path, kind):
+    given = {
+        "spectrum": kind, "convention": "radial", "level_rad2_hz": 3e-12, "corner_hz": 4.0,
+        "edges_hz": (0.0, 2.0, 20.0), "rms_rad": (4e-6, 2e-6), "file": "shaken.csv",
+    }  # fmt: skip
+    freq = np.geomspace(0.1, 100.0, 25)
+    rows = "".join(f"{f},{5.0 / (1.0 + f * f)}\n" for f in freq)
+    (tmp_path / "shaken.csv").write_text("Hz, urad^2/Hz\n" + rows, encoding="utf-8")
+    found = scenario.vibration(SimpleNamespace(**given), tmp_path, ())
+    expected = {
+        "first-order": math.sqrt(3e-12 * 4.0 * math.pi / 4.0), "table": math.sqrt(5e-12 * math.pi / 4.0),
+        "bands": math.sqrt(10e-12), "olympus": math.sqrt(40e-12 * math.pi),
+    }  # fmt: skip
+    assert found.rms_rad == pytest.approx(expected[kind], rel=0.02 if kind in ("bands", "table") else 1e-9)
+    assert found.name == ("OLYMPUS" if kind == "olympus" else "vibration")
+    if kind == "table":
+        (tmp_path / "shaken.csv").unlink()
+        held = NamedFile("shaken.csv", ("Hz, nrad^2/Hz\n" + rows).encode())
+        kept = scenario.vibration(SimpleNamespace(**given), tmp_path, (held,))
+        assert kept.rms_rad == pytest.approx(1e-3 * found.rms_rad, rel=1e-4)
+
+
+def test_a_sensor_of_four_cells_has_the_noise_of_its_light_at_half_its_rate(file):
+    f = file.mission.fine_pointing
+    cells = QuadCellTable.model_construct(
+        responsivity_a_w=0.8, background_power_w=2e-10, dark_current_a=3e-9, thermal_noise_a_sqrt_hz=4e-14
+    )
+    sensed = f.optical_sensor.model_copy(update={"noise_rad": None, "quad_cell": cells, "rate_hz": 2500.0})
+    table = f.model_copy(update={"optical_sensor": sensed})
+    found = scenario.optical_sensor(table, 5e-9, 1.31e-6, 0.07)
+    current, noise = 0.8 * 5e-9, 4 * 4e-14**2 + 2 * 1.602176634e-19 * (0.8 * 5e-9 + 0.8 * 2e-10 + 4 * 3e-9)
+    assert found.noise_rad == pytest.approx(
+        3 * math.pi / 16 * 1.31e-6 / 0.07 * math.sqrt(noise * 1250.0) / current, rel=1e-9
+    )
+    with pytest.raises(ValueError) as refused:
+        scenario.optical_sensor(table, None, 1.31e-6, 0.07)
+    assert str(refused.value) == "the noise of the tracking sensor follows from its light: give the received power in W"
+
+
+@pytest.mark.parametrize(
+    ("mirror_angle", "angle"), [("mechanical", "mechanical"), ("optical", "optical"), ("line-of-sight", "optical")]
+)
+def test_the_optics_of_a_mission_have_each_number_of_its_table(file, mirror_angle, angle):
+    given = {"incidence_rad": 0.2, "magnification": 1.0, "rotation_rad": 0.3, "coupling": (1.0, 0.1, -0.2, 0.9),
+             "layout": "tripod", "actuator_radius_m": 0.02}  # fmt: skip
+    found = scenario.optics(of_table(file, geometry=given), mirror_angle)
+    assert found == Geometry(angle, 0.2, 1.0, 0.3, ((1.0, 0.1), (-0.2, 0.9)), "tripod", 0.02)

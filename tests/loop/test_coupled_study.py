@@ -20,6 +20,7 @@ from microrad.loop.control import h_infinity
 from microrad.loop.controller_study import Outlook, promises
 from microrad.loop.coupled_study import designs, whole
 from microrad.loop.coupled_study.scene import line_of_sight
+from microrad.loop.disturbance import Misalignment, Reference
 from microrad.loop.pointing_loop import ensemble
 from microrad.loop.pointing_loop.design import whole_plant
 from microrad.loop.pointing_loop.linear import close, loop_response
@@ -634,3 +635,247 @@ def test_a_loop_of_all_axes_closes_with_plant_before_controller():
     G = plant.system.C[2:] @ np.linalg.inv(point * np.eye(5) - plant.system.A) @ plant.system.B[:, :2]
     K = c.C @ np.linalg.inv(point * np.eye(3) - c.A) @ c.B + c.D
     assert_allclose(whole._returned(plant, c, np.array([130.0]))[0], np.eye(2) - G @ K, rtol=1e-9)
+
+
+# ------------------------------------------------------------------------------------------------ designs by numbers
+@pytest.mark.parametrize(
+    ("low", "high", "following"),
+    [
+        ((0.5, 0.42), (math.inf, math.inf), 0.58), ((0.5, 0.4995), (math.inf, math.inf), 0.502),
+        ((0.5, 0.42), (0.6, math.inf), 0.55), ((0.0, 0.0), (0.5, math.inf), 0.25),
+        ((0.5, 0.4), (0.6, 0.6), 0.5 + 0.1 * 0.1025 / 0.2), ((0.7, 0.2), (0.8, 0.7), 0.7 + 0.1 * 0.3025 / 0.5),
+    ],
+)  # fmt: skip
+def test_the_next_margin_to_tune_for_lies_between_one_that_is_too_small_and_one_that_is_enough(low, high, following):
+    assert designs._between(0.5, low, high) == pytest.approx(following, rel=1e-12)
+
+
+def design_by(monkeypatch, whole_has, reachable=1.0, plants=5, base=None, asked=0.5):
+    """What `_designed` asks for and gives where a tuning for a margin leaves the whole with another."""
+    margins, made = [], []
+
+    def tuned(scene, family, of, margin):
+        margins.append(margin)
+        assert list(of) == [0, 1]
+        if margin > reachable:
+            raise ValueError(f"{margin:g} is out of reach")
+        return ("made", margin), {"a": margin}
+
+    def left(plant, controller):
+        return SimpleNamespace(modulus=whole_has(controller[1]) + (0.1 if plant != plants - 1 else 0.0))
+
+    def of(scene, name, controller, values, each):
+        made.append((name, controller, values, len(each)))
+        return designs.CoupledDesign(name, values, SimpleNamespace(name=name), None, np.array([3.0, 4.0]), None)
+
+    monkeypatch.setattr(designs, "_tuned", tuned)
+    monkeypatch.setattr(designs, "_margins", left)
+    monkeypatch.setattr(designs, "_of", of)
+    scene = SimpleNamespace(table=SimpleNamespace(modulus_margin=asked))
+    return margins, made, lambda: designs._designed(scene, SimpleNamespace(name="PI"), [*range(plants)], base)
+
+
+@pytest.mark.parametrize(
+    ("loses", "reachable", "asked"),
+    [
+        (float, 1.0, [0.5]),
+        (lambda m: m + 0.2, 1.0, [0.5]),
+        (lambda m: m - 0.125, 1.0, [0.5, 0.625]),
+        (lambda m: 0.5 * m, 1.0, [0.5, 0.75, 0.875, 0.938, 0.969, 0.984, 0.992, 0.996]),
+        (lambda m: m - 0.08 if m < 0.55 else m, 1.0, [0.5, 0.58, 0.541, 0.555, 0.547, 0.55, 0.548, 0.549]),
+        (lambda m: m - 0.08 if m < 0.52 else m - 0.03, 0.56, [0.5, 0.58, 0.54, 0.537, 0.535]),
+    ],
+)
+def test_a_family_is_tuned_for_the_least_margin_at_which_the_whole_keeps_what_is_asked_for(
+    monkeypatch, loses, reachable, asked
+):
+    margins, made, design = design_by(monkeypatch, loses, reachable)
+    kept = [m for m in asked if m <= reachable and loses(m) >= 0.5]
+    if not kept:
+        with pytest.raises(ValueError, match="PI keeps a modulus margin of 0"):
+            design()
+    else:
+        last = kept[-1]
+        assert design().tuned == {"a": last}
+        assert made == [("PI", ("made", last), {"a": last}, 5)]
+    assert margins == asked
+
+
+def test_a_family_out_of_reach_says_how_far_it_came_on_how_many_mirrors_or_why_it_is_none(monkeypatch):
+    _, _, design = design_by(monkeypatch, lambda m: 0.312345, 0.5, plants=3)
+    with pytest.raises(ValueError) as refused:
+        design()
+    assert str(refused.value) == (
+        "PI keeps a modulus margin of 0.312 with all axes closed, on the worst of 3 linear mirrors (about rest, over "
+        "the whole drive range, drawn from the identification), where 0.5 is asked for; identify it from more records, "
+        "lower fine_pointing.modulus_margin, or take another controller"
+    )
+    _, _, design = design_by(monkeypatch, float, -1.0)
+    with pytest.raises(ValueError, match=" is out of reach"):
+        design()
+
+
+@pytest.mark.parametrize(("before", "taken"), [([2.9, 4.0], "base"), ([3.1, 4.0], "own"), ([4.0, 3.0], "own")])
+def test_a_family_is_never_worse_than_the_one_that_it_contains(monkeypatch, before, taken):
+    own = control.WholeController("PI + notch", "system", "windup")
+    base = designs.CoupledDesign("base", {"b": 1.0}, own, "margins", np.array(before), "drive")
+    found = design_by(monkeypatch, float, base=base)[2]()
+    assert (found.name, found.tuned) == ("PI", {"b": 1.0} if taken == "base" else {"a": 0.5})
+    assert found.controller.name == "PI"
+
+
+@pytest.mark.parametrize(("modulus", "bound_by"), [(0.5099, ("modulus margin",)), (0.5101, ())])
+def test_a_design_has_the_smallest_of_each_margin_over_all_loops(monkeypatch, modulus, bound_by):
+    each = [(0.9, 0.7, 3.0, 50.0), (modulus, 0.8, 5.0, 40.0), (0.6, 0.6, 7.0, 60.0)]
+    margins = [whole.WholeMargins(m, control.MultiloopMargin(d, f), b) for m, d, f, b in each]
+    monkeypatch.setattr(designs, "assemble_whole", lambda name, loop, system, windup: (name, loop, system, windup))
+    monkeypatch.setattr(designs, "close", lambda loop, made: (loop, made))
+    left = SimpleNamespace(error=np.array([9.0, 16.0]), drive=np.array([0.25, 4.0, 1.0]))
+    monkeypatch.setattr(designs, "stationary", lambda closed: left if closed[0] == "rest" else None)
+    scene = SimpleNamespace(rest="rest", table=SimpleNamespace(modulus_margin=0.5))
+    found = designs._of(scene, "X", control.WholeController("Y", "s", "L"), {"a": 1.0}, margins)
+    assert (found.name, found.tuned, found.controller) == ("X", {"a": 1.0}, ("X", "rest", "s", "L"))
+    assert found.margins == whole.WholeMargins(modulus, control.MultiloopMargin(0.6, 7.0), 40.0)
+    assert (found.residual_rad.tolist(), found.drive_v.tolist()) == ([3.0, 4.0], [0.5, 2.0, 1.0])
+    assert (found.bound_by, found.margin, found.inverse) == (bound_by, None, "")
+
+
+def test_an_outlook_of_axes_strays_as_its_worst_axis_and_leaves_the_root_of_both():
+    found = coupled_study.CoupledOutlook((Outlook(4.0, 3.0), Outlook(2.0, 4.0)))
+    assert (found.simulated_rad, found.worst, found.holds) == (5.0, Outlook(2.0, 4.0), False)
+    kept = coupled_study.CoupledOutlook((Outlook(4.0, 6.0), Outlook(2.0, 1.0)))
+    assert (kept.worst, kept.holds) == (Outlook(4.0, 6.0), True)
+
+
+@pytest.mark.parametrize(("known", "feedforward"), [((0.0, 0.0), False), ((-3e-6, 0.0), True), ((0.0, 2e-6), True)])
+def test_a_feedforward_stands_behind_its_pi_where_a_reference_is_known(monkeypatch, known, feedforward):
+    kinds = [SimpleNamespace(name=name) for name in ("PI", "PI + notch", "LQG", "H-infinity")]
+    still = SimpleNamespace(point_ahead_rad=0.0, line_of_sight_rate_rad_s=0.0)
+    moved = SimpleNamespace(point_ahead_rad=known[0], line_of_sight_rate_rad_s=known[1])
+    monkeypatch.setattr(designs, "families", lambda f: kinds)
+    monkeypatch.setattr(designs, "references", lambda f: (still, moved))
+    expected = ["PI", *(["PI + feedforward"] if feedforward else []), "PI + notch", "LQG", "H-infinity"]
+    assert [*designs.names(None)] == expected
+    assert [designs.feedback_of(name) for name in ("PI + feedforward", "PI", "LQG")] == ["PI", "PI", "LQG"]
+
+
+def test_what_is_designed_in_turn_is_told_and_what_was_refused_is_named_beside_it(monkeypatch):
+    """The PI and what contains it in one turn; the feedforward takes the PI's feedback."""
+    kinds = [SimpleNamespace(name=n, base=b) for n, b in (("PI + notch", 1), ("LQG", None), ("H-infinity", None))]
+    kinds = [control.PI, *kinds]
+    has = ("PI", "PI + feedforward", "PI + notch", "LQG", "H-infinity")
+    said, turns = [], []
+    monkeypatch.setattr(designs, "names", lambda f: has)
+    monkeypatch.setattr(designs, "families", lambda f: kinds)
+    monkeypatch.setattr(designs, "plants", lambda scene: "plants")
+    monkeypatch.setattr(designs, "as_named", lambda scene, name, feedback: (name, feedback))
+
+    def in_turn(scene, families, of):
+        turns.append([f.name for f in families])
+        assert of == "plants"
+        return {
+            f.name: f"no {f.name}" if f.name == "LQG" else designs.CoupledDesign(f.name, {}, f.name, None, None, None)
+            for f in families
+        }
+
+    class Shared:
+        def __init__(self, jobs, told):
+            self.jobs, self.told = jobs, told
+
+        def __enter__(self):
+            return lambda: [self.told(i) or job() for i, job in enumerate(self.jobs)]
+
+        def __exit__(self, *_):
+            return None
+
+    monkeypatch.setattr(designs, "_designed_in_turn", in_turn)
+    monkeypatch.setattr(designs, "shared_out", Shared)
+    only = ("LQG", "PI + feedforward", "H-infinity", "PI + notch")
+    found = designs.design(SimpleNamespace(table=None), lambda *each: said.append(each), only)
+    assert turns == [["PI", "PI + notch"], ["LQG"], ["H-infinity"]]
+    assert said == [(0, 3, "tuning PI"), (1, 3, "tuning LQG"), (2, 3, "tuning H-infinity"), (3, 3, "controllers tuned")]
+    assert [(d.name, d.controller) for d in found.made] == [
+        ("PI + feedforward", ("PI + feedforward", "PI")), ("H-infinity", ("H-infinity", "H-infinity")),
+        ("PI + notch", ("PI + notch", "PI + notch")),
+    ]  # fmt: skip
+    assert found.refused == {"LQG": "no LQG"}
+    with pytest.raises(ValueError, match="no LQG"):
+        designs.design(SimpleNamespace(table=None), only=("LQG",))
+    with pytest.raises(ValueError) as refused:
+        designs.design(SimpleNamespace(table=None), only=("LQG", "PID"))
+    assert str(refused.value) == f"'PID' is no controller of a mirror of several axes; there are {', '.join(has)}"
+
+
+@pytest.mark.parametrize("angles", [designs.ALONG_AXES, (0.25, -1.25)])
+def test_loops_of_one_axis_are_tuned_along_their_directions_each_with_its_values(monkeypatch, angles):
+    asked = []
+
+    def tune(family, plants, wanted, seed, survey):
+        asked.append((plants, wanted, seed, survey))
+        return SimpleNamespace(controller=f"controller {len(asked)}", values={"zero": float(len(asked)), "gain": 7.0})
+
+    monkeypatch.setattr(designs, "loop_directions", lambda plant: angles)
+    monkeypatch.setattr(designs, "along", lambda plant, to: (plant, to))
+    monkeypatch.setattr(designs, "alone", lambda plant, loop: (*plant, loop))
+    monkeypatch.setattr(control, "tune", tune)
+    monkeypatch.setattr(designs, "side_by_side", lambda name, each: (name, each))
+    monkeypatch.setattr(designs, "on_axes", lambda made, to: (made, to))
+    scene = SimpleNamespace(table=SimpleNamespace(seed=13), loop=SimpleNamespace(axes=2))
+    made, values = designs._tuned(scene, control.PI, ["rest", "range"], 0.625)
+    assert made == (("PI", ["controller 1", "controller 2"]), angles)
+    wanted = control.Specification(0.625)
+    assert asked == [([("rest", angles, i), ("range", angles, i)], wanted, 13, 40) for i in range(2)]
+    directions = {"direction 1 in rad": 0.25, "direction 2 in rad": -1.25} if angles != designs.ALONG_AXES else {}
+    a, b = "xy" if not directions else "12"
+    assert values == {**directions, f"zero {a}": 1.0, f"gain {a}": 7.0, f"zero {b}": 2.0, f"gain {b}": 7.0}
+
+
+def test_drives_that_stand_still_hold_the_settled_reference_and_the_offset_against_each_other():
+    scene = scene_of(three_actuators())
+    references = Reference(-30e-6, 8e-6, 0.5), Reference(5e-6, 0.0, 2.0)
+    settled = np.array([-30e-6 + 8e-6 / math.pi * (1 - math.exp(-20 * math.pi)), 5e-6])
+    offsets = np.array([4e-6, -11e-6])
+    drives = decoupling(scene.rest) / nominal_axis_gain(scene.rest)
+    for unknown, angles in (((), settled), ((Misalignment(4e-6, 9.0), Misalignment(-11e-6, 9.0)), settled + offsets)):
+        here = replace(scene, loop=replace(scene.loop, references=references, unknown=unknown))
+        assert here.static_v == pytest.approx(np.abs(drives @ angles).tolist(), rel=1e-9)
+    drive = replace(scene.loop.drive, minimum_v=-20.0, maximum_v=35.0)
+    for own, reach in (((-30.0, 30.0), (-20.0, 30.0)), ((-10.0, 40.0), (-10.0, 35.0))):
+        assert replace(scene, loop=replace(scene.loop, drive=drive, drive_range_v=own)).reach_v == reach
+
+
+@pytest.mark.parametrize(
+    ("of", "words"),
+    [
+        (1, "the mirror file has 1 angles as outputs: two are needed, that of axis x and that of axis y, or "
+            "displacements with positions"),
+        (3, "the mirror file has 3 angles as outputs: two are needed, that of axis x and that of axis y, or "
+            "displacements with positions"),
+    ],
+)  # fmt: skip
+def test_angles_of_other_than_two_axes_are_refused(of, words):
+    f = mission().mission.fine_pointing
+    with pytest.raises(ValueError) as refused:
+        line_of_sight(f, "optical", [Output(f"a{i}", "angle") for i in range(of)])
+    assert str(refused.value) == words
+
+
+def test_light_resonances_of_a_loop_are_those_below_half_the_rate_with_their_half_widths():
+    period = 2e-4
+    s = (
+        2
+        * np.pi
+        * np.array([-3.0 + 400j, -3.0 - 400j, -130.0 + 400j, -110.0 + 400j, -1.0 + 2497j, 0.0 + 50j, -7.0 + 0j])
+    )
+    at, half = whole._resonances(np.append(np.exp(s * period), 0.01j), period)
+    assert_allclose(at, [400.0, 400.0, 50.0], rtol=1e-9)
+    assert_allclose(half, [3.0, 110.0, 1e-9 / period], rtol=1e-6)
+
+
+def test_a_controller_with_a_number_that_is_not_finite_does_not_fit_whichever_matrix_has_it():
+    s = lti.StateSpace(np.eye(2) * 0.5, np.ones((2, 2)), np.ones((2, 2)), np.zeros((2, 2)))
+    whole._misfit(None, control.WholeController("X", s, np.zeros((2, 2))))
+    for key in "ABCD":
+        bad = replace(s, **{key: np.where(np.eye(2) > 0, getattr(s, key), math.inf)})
+        with pytest.raises(ValueError, match="controller 'X' holds a number that is not finite"):
+            whole._misfit(None, control.WholeController("X", bad, np.zeros((2, 2))))

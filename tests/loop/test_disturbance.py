@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from math import inf, nan, pi, sqrt
+from math import exp, inf, nan, pi, sqrt
 
 import numpy as np
 import pytest
@@ -1221,3 +1221,264 @@ def test_a_sampled_reference_is_that_of_the_nearest_sample_and_its_last_behind_t
     found = disturbance.SampledReference(samples, period_s)
     assert found.at(time_s) == samples[place]
     assert (found.point_ahead_rad, found.line_of_sight_rate_rad_s, found.body_bandwidth_hz) == (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("edges_hz", "squares", "widths_hz", "wanted"),
+    [
+        ([0.0, 2.0, 7.0], [9.0, 4.0], [2.0, 5.0, 693.0], [9.0, 4.0, 0.4]),
+        ([3.0, 5.0, 11.0, 12.0], [9.0, 4.0, 2.5], [2.0, 6.0, 1.0, 1188.0, 3.0], [9.0, 4.0, 2.5, 0.25, 13.5]),
+        ([0.2, 5.0, 30.0], [8.0, 3.0], [4.8, 25.0, 2970.0, 0.2], [8.0, 3.0, 0.3, 0.8]),
+    ],
+)
+def test_bands_are_compared_by_integrals_and_what_lies_beside_them_has_a_ceiling(edges_hz, squares, widths_hz, wanted):
+    found = terms.band_samples(np.array(edges_hz), np.array(squares))
+    assert_allclose(np.add.reduceat(found.weights, found.starts), widths_hz, rtol=1e-9)
+    assert_allclose(found.wanted, wanted, rtol=1e-12)
+    assert found.ceiling.tolist() == [False] * len(squares) + [True] * (len(wanted) - len(squares))
+    assert found.trust.tolist() == [1.0] * len(wanted)
+    ends = np.sort([*edges_hz, 100.0 * edges_hz[-1]])
+    low, high = np.append(ends[:-1], 0.0)[: len(wanted)], np.append(ends[1:], ends[0])[: len(wanted)]
+    assert_allclose(found.centre_hz, 0.5 * (low + high), rtol=1e-9)
+    first = Term("first-order", 1.0, 2.5)
+    within = 2 / pi * (np.arctan(high / 2.5) - np.arctan(low / 2.5))
+    assert_allclose(found.rows([first]), within, rtol=1e-6)
+
+
+def test_rows_of_a_table_are_averaged_within_3_percent_and_a_gap_between_them_counts_as_one_row():
+    freq = np.array([1.0, 1.01, 1.02, 1.1, 1.12, 2.0, 2.02])
+    density = np.array([3.0, 5.0, 4.0, 9.0, 7.0, 2.0, 1.0])
+    found = terms.table_samples(freq, density)
+    nodes, wanted = [], []
+    for low, a, high, b, count in ((1.02, 4.0, 1.1, 9.0, 1), (1.12, 7.0, 2.0, 2.0, 18)):
+        place = np.arange(1, 4 * count + 1) / (4 * count + 1)
+        nodes += [*(low * (high / low) ** place)]
+        wanted += [*np.mean((a * (b / a) ** place).reshape(count, 4), axis=1)]
+    assert_allclose(found.nodes_hz, [*freq, *nodes], rtol=1e-12)
+    assert_allclose(found.wanted, [4.0, 8.0, 1.5, *wanted], rtol=1e-12)
+    assert_allclose(found.weights, [1 / 3] * 3 + [1 / 2] * 4 + [1 / 4] * 76, rtol=1e-12)
+    assert found.starts.tolist() == [0, 3, 5, *range(7, 83, 4)]
+    assert_allclose(found.trust, [1.0] * 4 + [18**-0.5] * 18, rtol=1e-12)
+    assert_allclose(found.centre_hz, [1.01, 1.11, 2.01, *np.mean(np.reshape(nodes, (19, 4)), axis=1)], rtol=1e-12)
+    assert not found.ceiling.any()
+
+
+@pytest.mark.parametrize(("count", "nodes"), [(8, 8), (9, 8), (40, 8), (1, 1)])
+def test_a_group_of_many_rows_has_eight_nodes_from_its_first_to_its_last(count, nodes):
+    rows = np.geomspace(1.0, 1.025, count)
+    found = terms.table_samples(np.array([*rows, 1.9, 2.5]), np.arange(1.0, count + 3.0))
+    assert_allclose(found.nodes_hz[:nodes], np.linspace(1.0, 1.025, 8) if count > 8 else rows, rtol=1e-12)
+    assert (found.starts[1], found.wanted[0]) == (nodes, pytest.approx(np.mean(np.arange(1.0, count + 1.0))))
+
+
+SUM = [Term("band-pass", 2.0, 6.0, 0.2), Term("first-order", 3.0, 1.5), Term("low-pass", 0.5, 20.0, 0.6)]
+
+
+def compared(ceilings=(), scale=1.0, trust=(1.0, 0.5, 0.25, 1.0, 0.8)):
+    """Five rows of the sum above times what they are off, and of which ceilings are."""
+    nodes, weights = np.array(["0.4", "0.9", "2.0", "5.0", "5.8", "6.5", "15.0", "31.0"], float), np.arange(1.0, 9.0)
+    starts = np.array([0, 2, 3, 5, 6])
+    rows = np.add.reduceat(weights * sum(terms.term_density(t, nodes) for t in SUM), starts)
+    wanted = scale * rows * np.array([1.0, 2.0, 0.5, 1.25, 0.1])
+    return terms.Samples(nodes, weights, starts, wanted, np.isin(range(5), ceilings), np.array(trust), nodes[starts])
+
+
+@pytest.mark.parametrize(
+    ("ceilings", "expected"),
+    [
+        ((), [0.0, -0.5 * np.log(2), 0.25 * np.log(2), -np.log(1.25), 0.8 * np.log(10)]),
+        ((1, 2), [0.0, 0.0, 0.25 * np.log(2), -np.log(1.25), 0.8 * np.log(10)]),
+        ((3, 4), [0.0, -0.5 * np.log(2), 0.25 * np.log(2), 0.0, 0.8 * np.log(10)]),
+    ],
+)
+def test_a_misfit_is_a_logarithm_by_trust_and_nothing_below_a_ceiling(ceilings, expected):
+    samples = compared(ceilings)
+    assert_allclose(samples.misfit(SUM), expected, atol=1e-12)
+    square = np.mean(np.square(expected))
+    assert terms.cost(samples, SUM) == pytest.approx(5 * np.log(square) + 25.0 * 5, rel=1e-9)
+    assert terms._worst(samples, SUM) == pytest.approx(np.max(np.abs(expected)))
+    assert_allclose(samples.misfit([])[0], np.log(1e-12 * np.max(samples.wanted) / samples.wanted[0]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("ceilings", [(), (1, 4), (3,)])
+def test_slopes_of_the_misfit_are_its_differences_by_variance_frequency_and_damping(ceilings):
+    samples, step = compared(ceilings), 1e-5
+    found = terms._slopes(samples, SUM)
+    assert found.shape == (5, 9)
+    for i, term in enumerate(SUM):
+        for k, key in enumerate(("variance_rad2", "freq_hz", "damping")):
+            both = [
+                samples.misfit([*SUM[:i], replace(term, **{key: getattr(term, key) * exp(s * step)}), *SUM[i + 1 :]])
+                for s in (1, -1)
+            ]
+            assert_allclose(found[:, 3 * i + k], (both[0] - both[1]) / (2 * step), rtol=1e-4, atol=2e-6)
+
+
+def test_fewer_states_are_a_term_less_or_one_of_first_order_in_its_place():
+    plain = [replace(t, kind="first-order", damping=0.9) for t in SUM]
+    assert terms._smaller(SUM) == [
+        SUM[1:],
+        [SUM[0], SUM[2]],
+        SUM[:2],
+        [plain[0], *SUM[1:]],
+        [*SUM[:2], plain[2]],
+    ]
+    assert terms._smaller(SUM[:1]) == [[plain[0]]]
+    assert terms._smaller(SUM[1:2]) == []
+    assert [terms.states_of(each) for each in ([], SUM, SUM[1:], SUM[1:2])] == [0, 5, 3, 1]
+
+
+def test_variances_of_least_relative_error_are_those_of_the_sum_the_strongest_first():
+    exact = replace(compared(trust=[1.0] * 5), wanted=compared().rows(SUM))
+    found = terms._powers(exact, [replace(t, variance_rad2=7.0) for t in (SUM[2], SUM[0], SUM[1])])
+    heights = [np.max(exact.rows([t]) / exact.wanted) for t in found]
+    assert heights == sorted(heights, reverse=True)
+    assert {t.kind: pytest.approx(t.variance_rad2, rel=1e-6) for t in found} == {t.kind: t.variance_rad2 for t in SUM}
+    assert {(t.kind, t.freq_hz, t.damping) for t in found} == {(t.kind, t.freq_hz, t.damping) for t in SUM}
+    absent = terms._powers(exact, [*SUM[:2], Term("band-pass", 1.0, 900.0, 0.01)])
+    assert 900.0 not in [t.freq_hz for t in absent] or len(absent) == 3
+
+
+@pytest.mark.parametrize(("states", "has"), [(1, 1), (3, 3), (5, 5), (None, 5), (11, 11), (12, 12)])
+def test_a_fit_is_brought_to_the_states_that_are_asked_for_or_to_those_that_its_spectrum_has(states, has):
+    f = np.geomspace(0.1, 100.0, 120)
+    samples = terms.table_samples(f, sum(terms.term_density(t, f) for t in SUM))
+    fitted = terms.fit_terms(samples, (0.03, 200.0), 0.05, 0.01)
+    assert terms.states_of(fitted) == 10
+    found = terms.with_states(samples, fitted, (0.03, 200.0), 0.05, states)
+    assert terms.states_of(found) == has
+    assert all(0.03 <= t.freq_hz <= 200.0 and 0.05 * (1 - 1e-9) <= t.damping <= 0.9 * (1 + 1e-9) for t in found)
+    if has == 5:
+        by_kind = {
+            t.kind: (t.variance_rad2, t.freq_hz, *([t.damping] if t.kind != "first-order" else [])) for t in found
+        }
+        assert by_kind == {
+            "band-pass": pytest.approx((2.0, 6.0, 0.2), rel=1e-6),
+            "low-pass": pytest.approx((0.5, 20.0, 0.6), rel=1e-6),
+            "first-order": pytest.approx((3.0, 1.5), rel=1e-6),
+        }
+
+
+@pytest.mark.parametrize(
+    ("start", "bounds", "expected"),
+    [
+        ([0.0, 0.0], (-9.0, 9.0), [3.0, -1.5]),
+        ([0.0, 0.0], (-1.0, 2.0), [2.0, -1.0]),
+        ([50.0, -50.0], (-4.0, 3.5), [3.0, -1.5]),
+    ],
+)
+def test_least_squares_ends_at_the_minimum_or_at_the_bounds(start, bounds, expected):
+    def misfit(x):
+        return np.array([x[0] - 3.0, 2.0 * (x[1] + 1.5), 0.1 * (x[0] - 3.0) * (x[1] + 1.5)])
+
+    def slopes(x):
+        return np.array([[1.0, 0.0], [0.0, 2.0], [0.1 * (x[1] + 1.5), 0.1 * (x[0] - 3.0)]])
+
+    limits = np.array([[low] * 2 for low in bounds])
+    assert_allclose(terms._least_squares(misfit, slopes, np.array(start), limits), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("lacking", "limits", "freq_hz"), [(5.5, (1.0, 100.0), 5.5), (0.4, (1.0, 100.0), 1.0), (90.0, (1.0, 30.0), 30.0)]
+)
+def test_a_further_term_begins_where_the_sum_lacks_most_within_the_limits(monkeypatch, lacking, limits, freq_hz):
+    f, asked = np.geomspace(0.2, 150.0, 200), []
+    wanted = terms.term_density(SUM[1], f) * (1.0 + 9.0 * np.exp(-200.0 * np.log(f / lacking) ** 2))
+    samples = terms.table_samples(f, wanted)
+    monkeypatch.setattr(terms, "_polished", lambda samples, trial, limits: trial)
+    powers = terms._powers
+    monkeypatch.setattr(terms, "_powers", lambda s, trial: asked.append(trial[-1]) or powers(s, trial))
+    found = terms._with_one_more(samples, [SUM[1]], (*limits, 0.02))
+    assert [(t.kind, t.damping) for t in asked] == [
+        (k, z) for k in ("low-pass", "band-pass") for z in (0.7, 0.3, 0.1, 0.03)
+    ]
+    assert [t.freq_hz for t in asked] == [pytest.approx(freq_hz, rel=0.02)] * 8
+    best = min(terms._spread(samples, powers(samples, [SUM[1], t])) for t in asked)
+    assert terms._spread(samples, found) == pytest.approx(best)
+    asked.clear()
+    terms._with_one_more(samples, [SUM[1]], (*limits, 0.3), ("first-order",))
+    assert [(t.kind, t.damping) for t in asked] == [("first-order", 0.7), ("first-order", 0.3)]
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("f / Hz, S / (mrad**2/Hz)\r\n.5, 2\r\n1e1, 3\r\n+20, 4.5", None, (1e-6, [0.5, 10, 20], [2, 3, 4.5])),
+        ("\ufeffHz urad2_hz\n0 1\n\n 1   2 \n2\t3\n", None, (1e-12, [0, 1, 2], [1, 2, 3])),
+        ("0 1\n1 2\n2 3", "mrad^2/Hz", (1e-6, [0, 1, 2], [1, 2, 3])),
+        ("\ufeff# Hz; RAD^2/HZ\n0;1\n#1;7\n2;3\n  # ; \n4;0", None, (1.0, [0, 2, 4], [1, 3, 0])),
+        ("in Hz\nPSD (nrad² per Hz)\n1,1\n2,2\n3,3", "nrad^2/Hz", (1e-18, [1, 2, 3], [1, 2, 3])),
+        ("f in Hz, urad/s of old, and \u03bcrad^2/Hz\n1,1\n2,2\n3,3", None, (1e-12, [1, 2, 3], [1, 2, 3])),
+    ],
+)
+def test_a_table_is_read_whatever_its_lines_end_with_and_its_marks_are(text, unit, expected):
+    scale, freq, density = expected
+    found = read_table("rows.csv", unit, text.encode())
+    assert_allclose(found[0], freq, rtol=1e-15)
+    assert_allclose(found[1], scale * np.array(density), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "words"),
+    [
+        ("f (mHz), rad^2/Hz\n1,1", None, ': the heading says "mHz"; give frequencies in Hz'),
+        ("w in rad / s, rad^2/Hz\n1,1", "rad^2/Hz", ': the heading says "rad / s"; give frequencies in Hz'),
+        ("Hz, urad^2/Hz\n1,1", "mrad^2/Hz", ": the units mrad^2/Hz and urad^2/Hz are named; write one heading line"),
+        ("Hz\n#Hz urad^2/Hz\nnan 3\n1 2\n2 2", None, ", line 3: (nan Hz, 3e-12 rad^2/Hz) holds a number that is not"),
+        ("Hz rad^2/Hz\n\n#\n1 2\n2 inf\n3 4", None, ", line 5: (2 Hz, inf rad^2/Hz) holds a number that is not finite"),
+        ("1 2\n2 3\n3 4\n4", "rad^2/Hz", ", line 4: 1 columns; give two, frequency (Hz) and density, with a decimal"),
+        ("1;2\n2;3;\n3;4", "rad^2/Hz", ", line 2: 3 columns; give two, frequency (Hz) and density, with a decimal"),
+        ("1,5; 2,5\n2;3\n3;4", "rad^2/Hz", ', line 1: "1,5; 2,5" is not two numbers; decimals take a point'),
+        ("1, " + "x" * 80, "rad^2/Hz", ', line 1: "1, ' + "x" * 57 + '" is not two numbers; decimals take a point'),
+        ("", "rad^2/Hz", ": 0 frequencies and 0 densities; give as many of both, three or more"),
+        ("Hz, krad^2/Hz\n1 2\n2 3\n3 4", None, ": no unit of the density is named; write one heading line such as"),
+    ],
+)
+def test_a_faulty_table_is_refused_at_its_line_whatever_stands_before_it(text, unit, words):
+    with pytest.raises(ValueError) as refused:
+        read_table("rows.csv", unit, text.encode())
+    assert str(refused.value).startswith("rows.csv" + words)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_table_of_just_what_it_may_have_is_read(tmp_path, monkeypatch, more):
+    text = b"1 2\n2 3\n3 4\n"
+    monkeypatch.setattr(tables, "_MAX_BYTES", len(text))
+    (tmp_path / "rows.txt").write_bytes(text + b" " * more)
+    for data in (None, text + b" " * more):
+        if more:
+            with pytest.raises(ValueError, match="more than 0 MB; average the spectrum to fewer rows"):
+                read_table(tmp_path / "rows.txt", "rad^2/Hz", data)
+        else:
+            assert read_table(tmp_path / "rows.txt", "rad^2/Hz", data)[1].tolist() == [2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize(("density", "share"), [([4.0, 2.0, 7.0, 1.0, 3.0], 1.0), ([5.0, 5.0, 5.0, 2.0, 9.0], 0.5)])
+def test_an_interval_of_a_table_is_the_integral_of_a_power_of_frequency(density, share):
+    f, S = np.array([0.3, 0.9, 2.0, 2.5, 11.0]), share * np.array(density)
+    steep = f[1] * 0.5 ** np.arange(3)[::-1], S[1] * 2.0 ** np.arange(3)[::-1]  # 1/f
+    found = fits._power_law_integrals(f, S)
+    between = np.exp(np.interp(np.log(fine := np.geomspace(0.3, 11.0, 200_001)), np.log(f), np.log(S)))
+    summed = np.append(0.0, np.cumsum(0.5 * (between[1:] + between[:-1]) * np.diff(fine)))
+    assert_allclose(found, np.diff(np.interp(f, fine, summed)), rtol=1e-6)
+    assert_allclose(fits._power_law_integrals(*steep), S[1] * f[1] * np.log(2.0), rtol=1e-12)
+
+
+def test_a_table_is_fitted_from_a_third_of_its_first_to_twice_its_last_frequency_with_its_rows_damping(
+    monkeypatch,
+):
+    def asked_of(fit, *given):
+        def terms_of(samples, range_hz, least_damping, tolerance):
+            raise LookupError(*range_hz, least_damping, tolerance)
+
+        monkeypatch.setattr(fits, "fit_terms", terms_of)
+        with pytest.raises(LookupError) as asked:
+            fit(*given, convention="radial")
+        return list(asked.value.args)
+
+    for count, damping in ((120, 0.25 * np.log(100.0) / 119), (12, 0.25 * np.log(100.0) / 11), (6000, 0.002), (3, 0.5)):
+        f = np.geomspace(0.5, 50.0, count)
+        found = asked_of(fit_table, f, 1e-12 / (1 + f**2))
+        assert found == [pytest.approx(0.5 / 3), pytest.approx(100.0), pytest.approx(damping), 0.1]
+    assert asked_of(fit_bands, [2.0, 4.0, 30.0], [3e-6, 2e-6]) == [2.0, 30.0, 0.5, 0.01]
+    assert asked_of(fit_bands, [0.0, 4.0, 30.0], [3e-6, 2e-6]) == [0.4, 30.0, 0.5, 0.01]

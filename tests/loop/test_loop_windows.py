@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.loop.disturbance import Disturbance, SpectralLine, first_order
-from microrad.loop.disturbance.windows import ErrorIndex, recorded_rms, windowed_rms
+from microrad.loop.disturbance.windows import ErrorIndex, rational_rms, recorded_rms, windowed_rms
+from microrad.loop.pointing_loop import windows
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.windows import windowed
 from microrad.loop.workbench import Controller, Loop
@@ -130,3 +131,69 @@ def test_windows_of_any_length_and_loops_that_have_none():
         windowed(each, ErrorIndex("MPE", 1e-4))
     with pytest.raises(ValueError, match="is unstable: a pole at"):
         windowed(closed(controller=Controller.pid(0.0, 5e7, rate_hz=1000.0)), ErrorIndex("APE"))
+
+
+def hand_span(F, Q):
+    return windows._Span(np.array(F), np.array(Q))
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 8, 13])
+def test_a_span_of_many_readings_is_each_behind_the_other(count):
+    one = hand_span([[0.9, 0.2], [-0.1, 0.7]], [[1.0, 0.3], [0.3, 2.0]])
+    F, Q = np.eye(2), np.zeros((2, 2))
+    for _ in range(count):
+        F, Q = one.F @ F, one.F @ Q @ one.F.T + one.Q
+    found = one.times(count)
+    assert_allclose(found.F, F, rtol=1e-12)
+    assert_allclose(found.Q, Q, rtol=1e-12)
+    later = hand_span([[0.0, 1.0], [1.0, 0.5]], np.eye(2))
+    both = one.then(later)
+    assert_allclose(both.F, later.F @ one.F)
+    assert_allclose(both.Q, later.F @ one.Q @ later.F.T + np.eye(2))
+
+
+@pytest.mark.parametrize("sign", [0.0, -1.0])
+def test_sums_are_added_with_a_sign_and_are_kept_themselves(sign):
+    one = hand_span([[0.9, 0.2, 0.0], [-0.1, 0.7, 0.0], [3.0, 4.0, 1.0]], np.arange(9.0).reshape(3, 3))
+    found = windows._signed(one, 1, sign)
+    assert_allclose(found.F, [[0.9, 0.2, 0.0], [-0.1, 0.7, 0.0], [3.0 * sign, 4.0 * sign, 1.0]])
+    assert_allclose(found.Q, [[0.0, 1.0, 2.0 * sign], [3.0, 4.0, 5.0 * sign], [6.0 * sign, 7.0 * sign, 8.0 * sign**2]])
+
+
+@pytest.mark.parametrize(
+    ("index", "every", "readings"),
+    [(ErrorIndex("APE"), 1, (0, 0)), (ErrorIndex("MPE", 0.0104), 1, (10, 0)),
+     (ErrorIndex("PDE", 0.0104, 0.0016), 1, (10, 2)),
+     (ErrorIndex("PRE", 0.0104, 0.0046), 3, (3, 2)), (ErrorIndex("RKE", 0.00151), 3, (1, 0))],
+)  # fmt: skip
+def test_times_of_an_index_are_whole_readings_of_the_sensor(index, every, readings):
+    loop = replace(LOOP.parts, optical=replace(LOOP.parts.optical, every=every))
+    assert windows.readings_of(loop, index) == readings
+
+
+@pytest.mark.parametrize(
+    ("index", "words"),
+    [(ErrorIndex("PDE", 0.01, 0.0014), "spacing_s of PDE is 0.0014 s, and the sensor reads every 0.003 s: give more"),
+     (ErrorIndex("RKE", 0.0014), "window_s of RKE is 0.0014 s, and the sensor reads every 0.003 s: give more")],
+)  # fmt: skip
+def test_a_time_below_half_of_a_reading_is_refused_by_its_name(index, words):
+    with pytest.raises(ValueError) as refused:
+        windows.readings_of(slow_sensor(), index)
+    assert str(refused.value) == words
+
+
+def test_errors_in_windows_are_told_by_source_before_and_behind_the_loop():
+    """Of two disturbances of one axis and a line: before by their own spectra, behind by every source of the loop."""
+    indices = (ErrorIndex("MPE", 0.005), ErrorIndex("PDE", 0.005, 0.007))
+    mean, drift = windows.windowed_errors(closed(), indices)
+    assert (mean.index, drift.index) == indices
+    for each in (mean, drift):
+        assert each.before == {
+            "vibration": pytest.approx(windowed_rms(SLOW, each.index)),
+            "wheel": pytest.approx(windowed_rms(LINES, each.index)),
+        }  # fmt: skip
+        left = windowed(closed(), each.index)
+        assert each.left == {name: pytest.approx(math.sqrt(max(v[0], 0.0))) for name, v in left.items()}
+        assert set(each.left) == {"vibration", "wheel", "optical sensor noise", "gauge noise"}
+    assert mean.rational == pytest.approx(math.hypot(*(rational_rms(d, mean.index) for d in (SLOW, LINES))))
+    assert math.isnan(drift.rational)

@@ -12,8 +12,8 @@ from scipy.linalg import block_diag, solve_discrete_are, solve_discrete_lyapunov
 from design_plants import axis_plant
 from microrad.core import kernels, lti
 from microrad.loop.control import analysis, lqg
-from microrad.loop.control.lqg import LQG, Weights
-from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController
+from microrad.loop.control.lqg import LQG, LQG_OF_AXES, Weights
+from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, WholePlant
 
 PERIOD = 2e-4
 near = partial(pytest.approx, abs=0.0, rel=1e-6)  # variances are far below the default of 1e-12
@@ -355,3 +355,107 @@ def test_it_comes_back_from_the_limit_without_winding_up():
     print(f"left behind: {after[0]:.2e} rad samples, without a limit {after[1]:.2e}, wound up {after[2]:.2e}")
     assert after[0] == near(after[1], rel=0.1)
     assert after[2] > 1.4 * after[0]
+
+
+# ------------------------------------------------------------------------------------------------ parts by hand
+def test_each_state_is_in_a_unit_of_about_what_some_thousand_samples_of_it_build_up():
+    plant = axis_plant(resonance=(700.0, 0.01), corner_hz=0.3)
+    found, s = lqg.in_own_units(plant), plant.system
+    total, power = np.zeros_like(s.A), s.B @ s.B.T
+    for _ in range(30_000):
+        total, power = total + power, 0.998001 * s.A @ power @ s.A.T
+    unit = 2.0 ** np.round(np.log2(np.sqrt(np.diag(total))))
+    assert_allclose(found.system.A, s.A * unit / unit[:, None], rtol=1e-12)
+    assert_allclose(found.system.B * unit[:, None], s.B, rtol=1e-12)
+    assert_allclose(found.system.C / unit, s.C, rtol=1e-12)
+    assert (found.system.D is s.D, found.gain_rad_v, found.period_s) == (True, plant.gain_rad_v, plant.period_s)
+
+
+@pytest.mark.parametrize(("left", "right"), [(0.9, 0.5), (0.99, 1.0), (0.9999, 1.0), (0.3, 1e-6), (0.7, 1.2)])
+def test_a_stein_equation_is_solved_however_slowly_its_sum_settles(left, right):
+    cos, sin = np.cos(1.0), np.sin(1.0)
+    A, B = left * np.array([[1.0, 0.0], [0.0, 0.4]]), right * np.array([[cos, sin], [-sin, cos]])
+    Q = np.array([[1.0, -2.0], [0.5, 3.0]])
+    Z = lqg.stein(A, B, Q)
+    assert_allclose(Z, A.T @ Z @ B + Q, rtol=1e-9, atol=1e-9)
+
+
+def test_a_stein_equation_without_a_sum_is_refused():
+    with pytest.raises(ValueError, match="the disturbance grows faster than the loop settles"):
+        lqg.stein(np.array([[0.8]]), np.array([[1.25]]), np.ones((1, 1)))
+
+
+@pytest.mark.parametrize("gauge", [True, False])
+def test_what_a_design_knows_is_the_plant_with_a_walk_noise_on_its_command_and_the_sensors_that_it_has(gauge):
+    plant, weights = axis_plant(resonance=(700.0, 0.01), gauge=gauge), lqg.Weights(1.0, 3.0, 0.5, 2.0)
+    found, s, n = lqg.observed(plant, weights), plant.system, plant.system.order
+    there = lti.frequency_response(s, np.array([1e-4 / plant.period_s]), plant.period_s)[0, :, 1:]
+    level = max(np.linalg.norm(there[0]), np.linalg.norm(there[1]))
+    rows = [1, 2] if gauge else [1]
+    assert found.sensors == [row - 1 for row in rows]
+    assert_allclose(found.A, np.block([[s.A, np.zeros((n, 1))], [np.zeros((1, n)), np.ones((1, 1))]]))
+    assert_allclose(found.command, np.vstack([s.B[:, :1], [[0.0]]]))
+    assert_allclose(found.residual, [[*s.C[0], 1.0]])
+    assert_allclose(found.seen, [[*s.C[row], float(row == 1)] for row in rows])
+    scale = np.array([1.0, 3.0, 3.0])
+    noise = np.zeros((n + 1, 5 + len(rows)))
+    noise[:n, :3], noise[:n, 3], noise[n, 4] = s.B[:, 1:] * scale, 0.5 * s.B[:, 0], 2.0 * 2 * np.pi * 1e-4 * level
+    assert_allclose(found.noise, noise, rtol=1e-9)
+    floor = 1e-6 * level * np.eye(len(rows))
+    assert_allclose(found.seen_noise, np.hstack([s.D[rows, 1:] * scale, np.zeros((len(rows), 2)), floor]), rtol=1e-9)
+    assert found.moved.tolist() == [*analysis.reachable(s.A, s.B[:, :1]), False]
+    without = lqg.observed(plant, lqg.Weights(1.0, 3.0, 0.5, 0.0))
+    assert (without.A.shape, without.seen.shape, without.noise.shape) == ((n, n), (len(rows), n), (n, 5 + len(rows)))
+
+
+@pytest.mark.parametrize("gauge", [True, False])
+def test_the_command_noise_is_sought_around_what_the_sensors_noise_is_worth_in_volts(gauge):
+    plant = axis_plant(gauge=gauge, noise_rad=4e-6)
+    weight, factor, noise = LQG.parameters(plant)
+    assert (weight.least, weight.most, weight.gentle, factor.least, factor.most, factor.gentle) == (
+        1e-4, 1e2, 1e2, 0.1, 30.0, 30.0
+    )  # fmt: skip
+    unit = 4e-6 / plant.gain_rad_v
+    assert (noise.least, noise.most, noise.gentle, noise.unit) == (
+        pytest.approx(1e-3 * unit, rel=1e-6), pytest.approx(10.0 * unit, rel=1e-6), None, "V"
+    )  # fmt: skip
+    quiet = LQG.parameters(axis_plant(gauge=gauge, noise_rad=0.0))[2]
+    there = lti.frequency_response(plant.system, np.array([0.5]), plant.period_s)[0, 0, 1]
+    assert quiet.most == pytest.approx(10.0 * 1e-6 * abs(there) / plant.gain_rad_v, rel=1e-6)
+
+
+@pytest.mark.parametrize("gain", [8e-5, -8e-5])
+def test_the_command_noise_of_several_axes_is_that_of_one_whichever_way_the_mirror_turns(gain):
+    rng, D = np.random.default_rng(2), np.zeros((4, 7))
+    D[2, 5], D[3, 6] = 3e-6, 4e-6
+    A = np.diag([0.5, 0.9, 0.3])
+    s = lti.StateSpace(A, rng.standard_normal((3, 7)) * [1, 1, 1, 1, 1, 0, 0], rng.standard_normal((4, 3)) * 1e-5, D)
+    noise = LQG_OF_AXES.parameters(WholePlant(PERIOD, s, 2, 3, gain))[2]
+    assert noise.least == pytest.approx(1e-3 * 5e-6 / (math.sqrt(2.0) * 8e-5), rel=1e-9)
+    assert noise.most == pytest.approx(1e4 * noise.least, rel=1e-9)
+    quiet = LQG_OF_AXES.parameters(WholePlant(PERIOD, replace(s, D=0.0 * D), 2, 3, gain))[2]
+    there = lti.frequency_response(s, np.array([1e-4 / PERIOD]), PERIOD)[0, 2:, 2:5]
+    assert quiet.most == pytest.approx(10 * 1e-6 * np.linalg.norm(there) / (math.sqrt(2.0) * 8e-5), rel=1e-9)
+
+
+def test_what_a_design_of_several_axes_knows_has_a_walk_on_each_axis_of_the_size_of_its_own_reading():
+    rng, n = np.random.default_rng(7), 4
+    s = lti.StateSpace(
+        np.diag([0.5, 0.9, 0.3, 0.8]), rng.standard_normal((n, 7)) * [1, 1, 1, 1, 1, 0, 0],
+        rng.standard_normal((4, n)), np.vstack([np.zeros((2, 7)), np.pad(np.diag([0.3, 0.7]), ((0, 0), (5, 0)))]),
+    )  # fmt: skip
+    found = lqg._observed_axes(WholePlant(PERIOD, s, 2, 3, 1e-4), Weights(1.0, 3.0, 0.5, 2.0))
+    there = lti.frequency_response(s, np.array([1e-4 / PERIOD]), PERIOD)[0, 2:, 2:]
+    level = np.sqrt(np.sum(np.abs(there) ** 2, axis=1))
+    scale = np.array([1.0, 1.0, 1.0, 3.0, 3.0])
+    noise = np.zeros((n + 2, 5 + 3 * 2))
+    noise[:n, :5], noise[:n, 5:7] = s.B[:, 2:] * scale, 0.5 * s.B[:, :2]
+    noise[4, 7], noise[5, 8] = 2.0 * 2 * np.pi * 1e-4 * level
+    assert_allclose(found.noise, noise, rtol=1e-9)
+    seen_noise = np.hstack([s.D[2:, 2:] * scale, np.zeros((2, 4)), 1e-6 * np.diag(level)])
+    assert_allclose(found.seen_noise, seen_noise, rtol=1e-9)
+    assert_allclose(found.A, block_diag(s.A, np.eye(2)))
+    assert_allclose(found.command, np.vstack([s.B[:, :2], np.zeros((2, 2))]))
+    assert_allclose(found.residual, np.hstack([s.C[:2], np.eye(2)]))
+    assert_allclose(found.seen, np.hstack([s.C[2:], np.eye(2)]))
+    assert (found.sensors, found.moved.tolist()) == ([0, 1], [True] * 4 + [False] * 2)

@@ -22,9 +22,13 @@ from microrad.loop.pointing_loop.design import (
     behind_filter,
     close_axis,
     design_plant,
+    driven_plant,
     narrow_band,
+    read_each_sample,
+    sampled_mirrors,
 )
 from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.feedforward import slow_slope_s
 from microrad.loop.pointing_loop.linear import residual_spectrum
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import OpticalSensor, StrainGauge
@@ -1463,3 +1467,240 @@ def test_drives_of_more_actuators_than_axes_leave_what_is_held_and_are_the_least
         assert_allclose(fine._drives_for_angles(loop), drives, rtol=1e-6)
         assert fine.nominal_axis_gain(loop) == pytest.approx(1.0 / np.max(np.abs(drives)), rel=1e-6)
         assert_allclose(optics @ gain @ fine.decoupling(loop), np.eye(2) * fine.nominal_axis_gain(loop), atol=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------ arrays by hand
+def unlike(**changes):
+    """Two actuators of unlike gains behind unlike optics, and no two numbers alike."""
+    of = mirror.combine(resonant_mirror(400.0, 0.03, 2e-4), resonant_mirror(700.0, 0.05, 1e-4))
+    found = PointingLoop(
+        mirror=of, optics=np.array([[1.0, 0.25], [-0.5, 0.75]]), drive=Drive(-3.0, 5.0, 800.0, 250.0, 2e-3, 7e-9),
+        timing=Timing(2e-4, 4, 6), disturbances=((disturbance.olympus(),), ()),
+        optical=OpticalSensor(3e-6, 4e-4, 6e-8, 3, 9), gauge=StrainGauge(8e-8, 1.5e-8),
+        references=(Reference(7e-6, 2e-6, 0.4, 1e-6, 30.0), Reference(-4e-6, 0.0, 1.0)), drive_range_v=(-2.5, 4.5),
+        unknown=(Misalignment(11e-6, 0.0), Misalignment(0.0, -500e-6)),
+    )  # fmt: skip
+    return replace(found, **changes)
+
+
+def idle(loop, outputs=2):
+    """A controller of one state that does nothing much."""
+    s = lti.StateSpace(np.array([[0.5]]), np.full((1, 6), 0.25), np.full((outputs, 1), 0.125), np.zeros((outputs, 6)))
+    return LoopController("idle", s, np.full((1, 2), 0.75))
+
+
+@pytest.mark.parametrize(
+    ("seed", "words"), [(5, [5, 0]), (2**32 + 7, [7, 1]), (2**64 + 3 * 2**32 + 9, [9, 3]), (2**32 - 1, [2**32 - 1, 0])]
+)
+def test_a_loop_has_each_of_its_numbers_in_the_kernels_arrays_and_64_bits_of_its_seed(seed, words):
+    loop = unlike()
+    p = kernel_arrays.arrays(loop, idle(loop), seed)
+    assert p.seed.tolist() == words
+    follow = 1 - exp(-2 * pi * 800.0 * 5e-5)
+    assert_allclose(p.actuator, [[-3.0, 5.0, 2e-3, follow, 250.0 * 5e-5, -2.5, 4.5]] * 2, rtol=1e-12)
+    numbers = (p.step_s, p.steps_per_sample, p.delay_steps, p.sensor_delay_steps, p.sensor_every)
+    assert numbers == (pytest.approx(5e-5), 4, 6, 9, 3)
+    assert p.optical_noise.tolist() == [3e-6] * 2
+    assert (p.optical_resolution, p.field_of_view, p.gauge_noise, p.gauge_resolution) == (6e-8, 4e-4, 8e-8, 1.5e-8)
+    assert p.optics.tolist() == [[1.0, 0.25], [-0.5, 0.75]]
+    assert (p.A.tolist(), p.B.tolist(), p.L.tolist()) == ([[0.5]], [[0.25] * 6], [[0.75] * 2])
+    assert (bool(p.feedforward), p.C.tolist()) == (False, [[0.125]] * 2)
+    without = kernel_arrays.arrays(replace(loop, gauge=None), idle(loop), seed)
+    assert (without.gauge_noise, without.gauge_resolution) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("name", "axis"), [("", 0), ("OLYMPUS", 1), ("reaction wheel", 0)])
+def test_streams_of_random_numbers_go_by_a_name_and_an_axis(name, axis):
+    code = np.uint32(0xFFFFFFFF)  # the check sum of ISO 3309, bit by bit
+    for byte in name.encode():
+        code ^= np.uint32(byte)
+        for _ in range(8):
+            code = (code >> np.uint32(1)) ^ (np.uint32(0xEDB88320) if code & np.uint32(1) else np.uint32(0))
+    short = int(~code) % 65_536
+    assert kernel_arrays.purpose_of(name, axis) == 256 * (4 * short + axis)
+    assert kernel_arrays.purpose_of(name, axis + 1) - kernel_arrays.purpose_of(name, axis) == 256
+
+
+@pytest.mark.parametrize("runs", [0, 1, 3])
+def test_references_stand_with_what_is_unknown_first_and_of_missing_runs_with_those_of_the_last(runs):
+    loop, time = unlike(), 2e-4 * np.arange(5, 9)
+    several = [(Reference(k * 1e-6, 0.0, 1.0), Reference(0.0, k * 1e-6, 2.0)) for k in range(1, runs + 1)]
+    found = kernel_arrays.reference(loop, 5, 8, several)
+    assert found.shape == (4, 4, kernels.LANES if runs else 1)
+    for lane in range(found.shape[2]):
+        own = several[min(lane, runs - 1)] if runs else loop.references
+        known = np.column_stack([r.at(time) for r in own])
+        added = np.column_stack([np.full(4, 11e-6), -500e-6 * time])
+        assert_allclose(found[:, :, lane], np.hstack([known + added, known]), rtol=1e-12, atol=1e-20)
+    assert_allclose(kernel_arrays.reference(replace(loop, unknown=()), 5, 8, several), found[:, 2:], rtol=1e-12)
+
+
+def test_disturbances_stand_at_even_states_each_with_its_own_streams_on_its_axis():
+    line = disturbance.wheels(90.0, (1.0, 2.0), (1e-9, 2e-9), convention="per-axis")
+    b = disturbance.first_order(1e-12, 9.0, convention="radial", name="b")
+    both = disturbance.combine(disturbance.olympus(), b)
+    loop = unlike(disturbances=((disturbance.olympus(), line), (both,)))
+    found = kernel_arrays.combined_shaping(loop)
+    parts = [disturbance.discretise(each, 5e-5) for each in (disturbance.olympus(), line, both)]
+    assert [at for at, _, _ in found.parts] == [0, 2, 6]
+    assert (found.diagonal.size, found.noise.shape, found.output.shape) == (8, (8, 3), (2, 8))
+    assert_allclose(found.output[0], [parts[0].C[0, 0], 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0], rtol=1e-12)
+    assert_allclose(found.output[1], [0.0] * 6 + parts[2].C[0].tolist(), rtol=1e-12)
+    first = [kernel_arrays.purpose_of(n, i) for n, i in (("OLYMPUS", 0), ("OLYMPUS + b", 1))]
+    assert found.purpose.tolist() == [first[0], first[1], first[1] + 1]
+    assert [p for _, _, p in found.parts] == [first[0], kernel_arrays.purpose_of("reaction wheel", 0), first[1]]
+    turned = 2 * pi * 90.0 * np.array([1.0, 2.0]) * 5e-5
+    assert_allclose(found.diagonal[2:6], np.repeat(np.cos(turned), 2), rtol=1e-15)
+    assert_allclose(found.coupling[2:6], np.repeat(np.sin(turned), 2) * [1, -1, 1, -1], rtol=1e-15)
+    assert_allclose(found.noise[6:, 1:], parts[2].Bd, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("inverse", "adaptation", "outputs"), [(None, None, 2), (True, None, 6), (True, True, 8)])
+def test_a_controller_has_an_output_for_each_drive_and_what_its_inverse_takes(inverse, adaptation, outputs):
+    loop = unlike()
+    made = replace(idle(loop, outputs), inverse=inverse, adaptation=adaptation)
+    kernel_arrays.check_controller(loop, made)
+    with pytest.raises(ValueError) as refused:
+        kernel_arrays.check_controller(loop, replace(idle(loop, 3), inverse=inverse, adaptation=adaptation))
+    assert str(refused.value) == (
+        f"controller 'idle': matrix C has the shape (3, 1), the loop needs ({outputs}, 1) (2 optical, 2 gauge and 2 "
+        f"reference inputs; {outputs} outputs)"
+    )
+
+
+def test_phases_are_uniform_in_the_probability_of_their_normal_numbers():
+    assert_allclose(kernel_arrays.uniform(np.array([-40.0, 0.0, 1.0, 40.0])), [0.0, pi, 2 * pi * 0.841344746, 2 * pi])
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "settle_s", "samples", "segment"),
+    [(0.01, 0.0, (50, 0), 32), (0.0129, 0.0002, (64, 1), 32), (0.01309, 0.00022, (65, 1), 64),
+     (1.0, 0.1, (5000, 500), 2048), (0.0002, 0.0, (1, 0), 1), (0.00045, 0.00009, (2, 0), 2)],
+)  # fmt: skip
+def test_a_run_is_counted_in_whole_control_samples_and_its_spectrum_in_segments_of_a_power_of_two(
+    duration_s, settle_s, samples, segment
+):
+    loop, span = unlike(), Span(duration_s, settle_s, 1)
+    assert ensemble.control_samples(loop, span) == samples
+    assert ensemble._segment(loop, span) == segment
+
+
+def test_runs_of_a_later_batch_are_told_by_their_number_and_have_no_spectrum():
+    loop, controller = with_pi(scenario())
+    said, beats = [], []
+    whole = ensemble.simulate(loop, controller, Span(0.02, 0.005, 3), 70)
+    found = ensemble.simulate(
+        loop, controller, Span(0.02, 0.005, 3), 5, first_run=64, threads=1,
+        on_progress=lambda *each: said.append(each), beat=lambda: beats.append(1),
+    )  # fmt: skip
+    assert_array_equal(found.rms_rad, whole.rms_rad[64:69])
+    assert_array_equal(found.histogram, whole.histogram[64:69])
+    assert np.isnan(found.psd_rad2_hz).all()
+    assert not np.isnan(whole.psd_rad2_hz).any()
+    assert (said[-1], len(beats) > 1) == ((5, 5, controller.name), True)
+    assert (found.name, found.samples, found.steps, found.readings) == (controller.name, 75, 750, 75)
+    assert found.seconds == pytest.approx(0.015)
+
+
+def test_a_replay_is_the_run_of_its_number_with_what_the_controller_read_and_made_of_it():
+    loop, controller = VARIANTS["two coupled axes"]()
+    loop = replace(loop, references=(Reference(7 * URAD, URAD, 1.0), STILL), unknown=(Misalignment(3 * URAD, 0.0),) * 2)
+    found = traces.replay(loop, controller, 40, 9, 3)
+    traced = traces.trace(loop, controller, Span(40 * loop.timing.period_s, 0.0, 9), 3)
+    assert_array_equal(found.error_rad, traced.error_rad)
+    assert_allclose(found.disturbance_rad, traced.disturbance_rad, rtol=1e-12, atol=1e-20)
+    assert_allclose(found.inputs[:, :2], traced.measured_rad, rtol=1e-12)
+    assert_allclose(found.inputs[:, -2:], traced.reference_rad, rtol=1e-12)
+    assert_allclose(found.inputs[1:, 2:4] - traced.mirror_rad[1:], 0.0, atol=6 * loop.gauge.noise_rad)
+    s, x = controller.system, np.zeros((controller.system.order, 1))
+    for row, command in zip(found.inputs, found.commands, strict=True):
+        assert_allclose(command, (s.C @ x)[:, 0] + s.D @ row, rtol=1e-6, atol=1e-9)
+        x = s.A @ x + s.B @ row[:, None]
+    assert (found.commands.shape, found.counts.shape) == ((40, 2), (kernels.COUNT_FIELDS,))
+
+
+# ------------------------------------------------------------------------------------------------ plants by hand
+def test_a_driven_plant_is_the_loop_without_noise_from_each_drive_to_error_reading_and_mirror():
+    loop = replace(unlike(), optical=OpticalSensor(3e-6, inf, 0.0, 1, 0), unknown=(), timing=Timing(2e-4, 4, 4))
+    s = driven_plant(loop)
+    assert (s.B.shape[1], s.C.shape[0]) == (2, 6)
+    Ad, B0, B1, through = held_linearly(loop.mirror, loop.timing.step_s)
+    follow = 1 - exp(-2 * pi * 800.0 * loop.timing.step_s)
+    for drive in range(2):
+        x, u, state, y = np.zeros(len(Ad)), np.zeros(2), np.zeros(s.order), np.zeros(2)
+        for k in range(12):
+            found = s.C @ state + s.D[:, drive]
+            assert_allclose(found, np.concatenate([-loop.optics @ y, -loop.optics @ y, loop.optics @ y]), atol=1e-12)
+            state = s.A @ state + s.B[:, drive]
+            due = np.eye(2)[drive] * (k >= 1)  # a sample of delay
+            for _ in range(4):
+                before, u = u, u + follow * (due - u)
+                x = Ad @ x + B0 @ before + B1 @ u
+                y = loop.mirror.C @ x + through @ u
+
+
+@pytest.mark.parametrize(
+    ("every", "steps", "late", "reads_late"), [(1, 9, 3, 3), (2, 10, 3, 8), (4, 5, 0, 8), (3, 1, 2, 3)]
+)
+def test_a_slow_sensor_counts_as_one_that_is_later_by_half_of_its_hold(every, steps, late, reads_late):
+    loop = scenario(optical=OpticalSensor(URAD, 2e-3, 1e-9, every, late), timing=Timing(2e-4, steps, 1))
+    assert read_each_sample(loop).optical == OpticalSensor(URAD, 2e-3, 1e-9, 1, reads_late)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_mirror_of_a_stack_answers_in_the_loop_as_in_its_design_plant(every):
+    loop = scenario(1, resonant_mirror(400.0, 0.03), optical=OpticalSensor(URAD, inf, 0.0, every, 4),
+                    timing=Timing(2e-4, 10, 7), optics=np.array([[1.7]]))  # fmt: skip
+    others = [resonant_mirror(f, z, g).linear_loop for f, z, g in ((400.0, 0.03, 1e-4), (650.0, 0.1, 3e-4))]
+    stack = lti.StateSpace(*(np.stack([getattr(s, key) for s in others]) for key in "ABCD"))
+    found = sampled_mirrors(loop, stack)
+    freq = np.array([3.0, 380.0, 900.0, 2400.0])
+    for i, of in enumerate((resonant_mirror(400.0, 0.03), resonant_mirror(650.0, 0.1, 3e-4))):
+        plant = design_plant(replace(loop, mirror=of)).from_command
+        own = lti.StateSpace(found.A[i], found.B[i], found.C[i], found.D)
+        expected = lti.frequency_response(plant, freq, 2e-4)[:, :, 0]
+        answers = lti.frequency_response(own, freq, 2e-4)[:, :, 0]
+        sign = np.sign(fine.nominal_axis_gain(loop))
+        assert_allclose(answers[:, 0], sign * expected[:, 0], rtol=1e-6)
+        assert_allclose(1.7 * answers[:, 1], expected[:, 1], rtol=1e-6)
+
+
+def test_the_slope_of_a_response_at_rest_is_minus_its_delay_times_its_gain():
+    """Two outputs: 3 of a delay of two samples, and a first-order lag of gain 5 with a time constant of 20 ms."""
+    keep, period = exp(-1e-3 / 20e-3), 1e-3
+    A = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, keep]])
+    B, C = np.array([[1.0], [0.0], [1.0 - keep]]), np.array([[0.0, 3.0, 0.0], [0.0, 0.0, 5.0]])
+    found = slow_slope_s(lti.StateSpace(A, B, C, np.array([[0.0], [9.0]])), period)
+    assert_allclose(found[:, 0], [-3.0 * 2e-3, -5.0 * period / (1.0 - keep)], rtol=1e-9)
+
+
+def test_a_filter_with_a_way_of_its_own_stands_in_the_path_of_the_command_alone():
+    plant = design_plant(scenario(1, resonant_mirror(400.0, 0.03)))
+    low_pass = lti.StateSpace(np.array([[0.7]]), np.array([[0.4]]), np.array([[0.6], [9.0]]), np.array([[0.2], [8.0]]))
+    found = behind_filter(plant, low_pass)
+    freq = np.array([1.0, 120.0, 400.0, 2400.0])
+    z = np.exp(2j * pi * freq * plant.period_s)
+    before, after = (lti.frequency_response(p.system, freq, p.period_s) for p in (plant, found))
+    assert_allclose(after[:, :, 0], before[:, :, 0] * (0.2 + 0.24 / (z - 0.7))[:, None], rtol=1e-9)
+    assert_allclose(after[:, :, 1:], before[:, :, 1:], rtol=1e-9, atol=1e-18)
+    assert (found.disturbances, found.gain_rad_v, found.system.order) == (
+        plant.disturbances, plant.gain_rad_v, plant.system.order + 1
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", [(), ((3e-6, 40.0),), ((3e-6, 40.0), (5e-7, 333.0))])
+def test_lines_beside_a_filter_become_bands_of_a_thousandth_behind_its_states(lines):
+    own = disturbance.combine(disturbance.olympus(), disturbance.body_pointing(3e-6, 3.0, 5.0))
+    shaken = replace(own, lines=tuple(disturbance.SpectralLine(*each) for each in lines))
+    found = narrow_band(shaken)
+    n, w = own.B.shape
+    more = 2 * len(lines)
+    assert (found.lines, found.A.shape, found.B.shape) == ((), (n + more,) * 2, (n + more, w + more))
+    assert_array_equal(found.A[:n, :n], own.A)
+    assert_array_equal(found.B[:n, :w], own.B)
+    assert found.variance_rad2 == pytest.approx(shaken.variance_rad2, rel=1e-9)
+    for i, (amplitude, freq) in enumerate(lines):
+        here = slice(n + 2 * i, n + 2 * i + 2)
+        assert_allclose(np.linalg.eigvals(found.A[here, here]), 2 * pi * freq * np.array([-1e-3 + 1j, -1e-3 - 1j]))
+        alone = replace(found, A=found.A[here, here], B=found.B[here], C=found.C[:, here])
+        assert alone.variance_rad2 == pytest.approx(0.5 * amplitude**2, rel=1e-9)

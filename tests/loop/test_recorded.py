@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from scipy.special import polygamma
+from scipy.special import digamma, polygamma
 from scipy.stats import chi2, kstest, norm
 
 from microrad.loop.disturbance import (
@@ -41,11 +41,13 @@ from microrad.loop.disturbance.terms import Term, term_filter
 from microrad.loop.pointing_loop import played
 from microrad.loop.pointing_loop.ensemble import Span, simulate
 from microrad.loop.pointing_loop.linear import close, stationary
+from microrad.loop.pointing_loop.loop import nominal_axis_gain
 from microrad.loop.pointing_loop.played import play, recorded_residual, refuse_short
 from microrad.loop.pointing_loop.traces import side_by_side
 from microrad.loop.workbench import Controller, Loop
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
+from microrad.mirror.model import combine as combine_mirrors
 
 LINES = (SpectralLine(6e-6, 47.3), SpectralLine(3e-6, 160.21))
 KNOWN = replace(olympus(), lines=LINES)
@@ -655,3 +657,113 @@ def test_lines_of_a_recording_are_told_strongest_above_their_surroundings_first_
     assert [line.freq_hz for line in lines] == pytest.approx([31.71, 7.33], rel=1e-5)
     assert [line.amplitude_rad for line in lines] == pytest.approx([3e-7, 5e-7], rel=5e-3)
     assert np.std(rest - noise) < 0.1 * np.std(noise)
+
+
+# ------------------------------------------------------------------------------------------- a fit and a run by parts
+@pytest.mark.parametrize("folded", [True, False])
+def test_rows_of_a_recording_hold_the_density_about_them_and_what_sampling_folds_there(folded):
+    """White noise behind 1/f^2 at its images: six of a density of 1 and, beyond them, 1/f^2 at three times the rate."""
+    centre, width, error = np.array([2.0, 10.0, 30.0]), np.array([0.0, 1.0, 6.0]), np.array([0.01, 0.03, 0.2])
+    rows = centre, width, np.array([5.0, 6.0, 7.0]), error
+    samples, sure = recorded_fit._rows(*rows, SimpleNamespace(half_rate_hz=50.0), folded)
+    images = [[abs(k * 100.0 + s * f) for k in (1, 2) for s in (-1, 1)] + [300.0] for f in centre]
+    own = centre[:, None] + 0.3 * width[:, None] * [-1, 0, 1]
+    nodes = np.hstack([own, images]) if folded else own
+    assert_allclose(samples.nodes_hz, nodes.ravel(), rtol=1e-12)
+    beyond = 2.0 * 9.0 * sum(1.0 / k**2 for k in range(3, 200_000))
+    weights = [1 / 3] * 3 + ([1.0] * 4 + [beyond] if folded else [])
+    assert_allclose(samples.weights, weights * 3, rtol=1e-4)
+    assert samples.starts.tolist() == [0, len(weights), 2 * len(weights)]
+    assert samples.wanted.tolist() == [5.0, 6.0, 7.0]
+    assert_allclose(samples.trust, [1.0, 0.5, 0.075], rtol=1e-12)
+    assert (sure.tolist(), samples.ceiling.any()) == ([True, True, False], np.False_)
+    _, least = recorded_fit._rows(*rows[:3], error + 0.3, SimpleNamespace(half_rate_hz=50.0), folded)
+    assert least.tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize(("segments", "below", "first", "last"), [(15, 0, 2, 100), (1, 8, 3, 16)])
+def test_bins_of_a_density_are_averaged_with_the_error_of_hanns_window_and_of_a_mean_of_few(
+    segments, below, first, last
+):
+    freq = 0.5 * np.arange(100)
+    power = 1.0 + np.arange(100.0) ** 2
+    centre, width, wanted, error = recorded_fit._averaged(freq, power, segments, below)
+    used, places = freq[first:last], np.log(np.arange(first, last) / first)
+    group = np.floor(places / (0.6 if below else 0.05))
+    parts = [np.flatnonzero(group == g) for g in np.unique(group)]
+    assert_allclose(centre, [np.mean(used[p]) for p in parts], rtol=1e-12)
+    assert_allclose(width, [0.5 * (len(p) - 1) for p in parts], atol=1e-12)
+    window = np.hanning(101)[:-1]
+    turned = [np.exp(2j * np.pi * k * np.arange(100) / 100) for k in (1, 2)]
+    shares = [abs(np.sum(window**2 * each) / np.sum(window**2)) ** 2 for each in turned]
+    for p, e, w in zip(parts, error, wanted, strict=True):
+        n = len(p)
+        spread = (n + 2 * (n - 1) * shares[0] + 2 * max(n - 2, 0) * shares[1]) / n**2
+        assert e == pytest.approx(math.sqrt(spread * (1.0 if segments == 1 else 1.0556 / segments)), rel=1e-9)
+        few = math.exp(-math.log(e**2) - digamma(1 / e**2))
+        assert w == pytest.approx(np.mean(power[first:last][p]) * few, rel=1e-9)
+
+
+@pytest.mark.parametrize("band_limited", [True, False])
+def test_the_density_of_samples_is_that_of_the_filter_and_of_what_sampling_folds(band_limited):
+    motion = SimpleNamespace(samples_rad=np.zeros(1001), half_rate_hz=50.0)
+    found = recorded_fit._spectrum(KNOWN, motion, band_limited)
+    freq = np.arange(401) * 100.0 / 1001
+    expected = psd(KNOWN, freq)
+    if not band_limited:
+        expected = sum(psd(KNOWN, abs(k * 100.0 + freq)) for k in range(-4000, 4001))
+    assert found.size == 401
+    assert_allclose(found, expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_motion_is_played_to_the_axis_that_it_is_of(axis):
+    loop = Loop(mirror=combine_mirrors(MIRROR, MIRROR), rate_hz=2000.0, optics=[[1.0, 0.3], [-0.2, 0.8]], delay_s=2e-4)
+    both = Controller.pid(0.0, 6e6, rate_hz=2000.0, axes=2)
+    slower = np.diag([1.0, 0.3])
+    s = replace(both.system, B=both.system.B @ slower, D=both.system.D @ slower)
+    controller = loop.assembled(replace(both, system=s))
+    motion = np.interp(np.arange(1001) / 10, np.arange(101), drawn(2000.0, 0.0505, 3))
+    found = play(close(loop.parts, controller), motion, axis)
+    alone = Loop(mirror=MIRROR, rate_hz=2000.0, optics=[[nominal_axis_gain(loop.parts) / 50e-6]], delay_s=2e-4)
+    own = Controller.pid(0.0, (6e6, 1.8e6)[axis], rate_hz=2000.0)
+    expected = play(close(alone.parts, alone.assembled(own)), motion)
+    assert_allclose(found, expected, rtol=0, atol=1e-6 * np.ptp(motion))
+
+
+def test_what_is_played_is_told_about_its_mean_and_by_its_eighths():
+    """Parts of plus and minus their size about a mean of 3, and three samples behind them that no part has."""
+    sizes = np.array([1.0, 2.0, 0.5, 4.0, 3.0, 1.5, 2.5, 1.25])
+    error = np.append(3.0 + np.repeat(sizes, 10) * np.tile([1.0, -1.0], 40), [3.0] * 3)
+    found = played._played(error, 0.5, 9.5)
+    assert (found.begin_s, found.end_s, found.mean_rad) == (0.5, 9.5, pytest.approx(3.0))
+    assert found.rms_rad == pytest.approx(math.sqrt(10 * np.sum(sizes**2) / 83))
+    assert (found.least_rms_rad, found.most_rms_rad) == pytest.approx((0.5, 4.0))
+    residual = played.RecordedResidual(found, 2.0, 0.1, 1.0, 0.0, "")
+    assert residual.difference == pytest.approx(found.rms_rad / 2.0 - 1.0)
+
+
+@pytest.mark.parametrize(
+    ("lasts_s", "settle_s", "correlation", "said"),
+    [
+        (3.0, 0.5, 0.25, None), (3.0, 0.5, 0.2501, "3.01 s"), (2.99, 0.5, 0.25, "3 s"), (1.3, 0.0, 0.25, "2.5 s"),
+    ],
+)  # fmt: skip
+def test_a_recording_holds_ten_of_its_correlation_times_behind_what_settles(lasts_s, settle_s, correlation, said):
+    fit = SimpleNamespace(motion=SimpleNamespace(name="tracker", duration_s=lasts_s), correlation_s=correlation)
+    if said is None:
+        refuse_short(fit, settle_s)
+        return
+    with pytest.raises(ValueError) as refused:
+        refuse_short(fit, settle_s)
+    start, end = str(refused.value).split(" s; the loop settles in ")
+    assert (start.split(" lasts ")[0], end.rsplit(": record ")[1]) == ('"tracker"', f"{said} or more")
+
+
+def test_a_power_beyond_a_frequency_is_the_sum_of_the_bins_above_it():
+    """Of a sine within the bins: all of it below and none above, but for what a Hann window spreads."""
+    rate = 256.0
+    motion = recorded_motion(np.sin(2 * np.pi * 40.0 * np.arange(8 * 256) / rate), 1 / rate)
+    assert recorded.beyond_rms(motion, 38.5) == pytest.approx(math.sqrt(0.5), rel=2e-3)
+    assert recorded.beyond_rms(motion, 40.0) == pytest.approx(math.sqrt(0.5 / 6), rel=2e-2)
+    assert recorded.beyond_rms(motion, 42.0) < 1e-2

@@ -475,3 +475,55 @@ def test_light_on_a_cell_of_numbers_unlike_each_other(found, expected):
 )
 def test_the_words_of_light_on_a_cell_say_each_of_its_numbers(found, expected):
     assert found() == expected
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sensor.noise_bandwidth_hz(1e-31), "optical sensor: sample rate is 1e-28 mHz; give a finite "),
+        (lambda: built(rate_hz=math.inf), "optical sensor: sample rate is inf; give a finite number above 0 Hz"),
+        (lambda: built(rate_hz=math.nan), "optical sensor: sample rate is nan; give a finite number above 0 Hz"),
+        (lambda: built(control_rate_hz=-math.inf), "control rate is -inf; give a finite number above 0 Hz"),
+        (lambda: built(plant_step_s=0.0), "plant step is 0 s; give a finite number above 0 s"),
+        (lambda: StrainGauge(math.inf, 0.0), "strain gauge: noise_rad is inf; give a finite number of at least 0 (0 "
+         "rad switches the noise off)"),
+        (lambda: built(delay_s=-20e-6), "optical sensor: delay is -20 µs; give a finite number of at least 0 (it runs "
+         "from the middle of the exposure to the delivery)"),
+        (lambda: built(delay_s=9e-6), "optical sensor: its delay of 9 µs is no whole number of plant steps of 20 µs: "
+         "it would end inside a step; the nearest delay that would do is 0 s, or choose a plant step that divides it"),
+        (lambda: built(rate_hz=622.08), "optical sensor: its sample rate of 622.08 Hz does not divide the control "
+         "rate of 5 kHz (into 8.03755 parts): its samples would fall between those of the controller; the nearest rate "
+         "that would do is 625 Hz"),
+        (lambda: built(rate_hz=4.9e3), "optical sensor: its sample rate of 4.9 kHz does not divide the control rate of "
+         "5 kHz (into 1.02041 parts): its samples would fall between those of the controller; the nearest rate that "
+         "would do is 5 kHz"),
+        (lambda: QuadCell(0.9, 0.0, math.inf, 0.0), "quad cell: dark_current_a is inf; give a finite number of at "
+         "least 0 (0 A is an ideal cell)"),
+        (lambda: CELL.noise_lines(1e-9, 0.0), "quad cell: noise bandwidth is 0 Hz; give a finite number above 0 Hz"),
+        (lambda: AirySpot(0.0, 0.05), "spot: wavelength_m is 0 m; give a finite number above 0 m"),
+        (lambda: AirySpot(1e-6, -0.05), "spot: aperture_m is -50 mm; give a finite number above 0 m"),
+        (lambda: GaussianSpot(-1e-5, 0.1), "spot: radius_m is -10 µm; give a finite number above 0 m"),
+        (lambda: OpticalSensor(0.0, -math.inf, 0.0, 1, 0), "optical sensor: field_of_view_rad is -inf, so it never "),
+        (lambda: OpticalSensor(0.0, 1.0, 0.0, 2.0, 0), "optical sensor: every is 2.0; give a whole number of at "),
+        (lambda: OpticalSensor(0.0, 1.0, 0.0, 1, -1), "optical sensor: delay_steps is -1; give a whole number of at "),
+        (lambda: OpticalSensor(0.0, 1.0, 2e30, 1, 0), "optical sensor: resolution_rad is "),
+    ],
+)  # fmt: skip
+def test_what_a_sensor_refuses_is_shown_as_it_was_given_with_what_would_do(call, words):
+    with pytest.raises(ValueError) as refused:
+        call()
+    said = str(refused.value)
+    assert said.startswith(words)
+    within = said.endswith((", from 1e-30 to 1e+30", "at least 0 and at most 1e+30 (0 rad is an ideal converter)"))
+    assert within == ("1e-28 mHz" in words or words.endswith("resolution_rad is "))
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "delay_s", "every", "steps"),
+    [(5e3 * (1 + 9e-10), 200e-6, 1, 10), (5e3 / 7 * (1 - 9e-10), 0.0, 7, 0), (625.0, 20e-6 * (1 + 9e-10), 8, 1),
+     (5e-3, 1.0, 1_000_000, 50_000)],
+)  # fmt: skip
+def test_rates_and_delays_within_rounding_of_whole_numbers_are_those(rate_hz, delay_s, every, steps):
+    found = built(rate_hz=rate_hz, delay_s=delay_s, resolution_rad=3e-9)
+    assert found == OpticalSensor(1e-6, 1e-3, 3e-9, every, steps)
+    assert built().resolution_rad == 0.0

@@ -429,3 +429,99 @@ def test_what_an_amplifier_held_back_is_its_limits_before_its_slew_limit(saturat
     counts = SimpleNamespace(saturated=saturated, slew_limited=slewed)
     trace = SimpleNamespace(counts=counts, time_s=np.zeros(200))
     assert tracking.Run(None, "PID", 25.0, trace).at_limits == words
+
+
+# ------------------------------------------------------------------------------------------- runs of made-up numbers
+def a_trace(error, steady=slice(1, None), **counts):
+    """A trace of these errors, its reference a ramp, of two drives."""
+    error = np.asarray(error, dtype=float).reshape(len(error), -1)
+    ramp = np.arange(float(len(error)))[:, None] * np.ones(error.shape[1])
+    drive = np.column_stack([np.cumsum(error[:, 0]), -2.0 * error[:, 0]])
+    none = dict.fromkeys(("clamped", "inverse_clamped", "saturated", "slew_limited", "alternating"), 0)
+    time = 0.02 * np.arange(len(error))
+    return simulate.Trace("", time, ramp, ramp - error, drive, drive, steady, simulate.Counts(**(none | counts)))
+
+
+def test_a_trace_of_two_axes_is_told_by_its_largest_and_its_mean_square_over_both():
+    trace = a_trace([[9.0, 9.0], [1.0, -2.0], [-4.0, 0.0], [2.0, 5.0]], slice(1, 4))
+    assert_array_equal(trace.error_rad[1:], [[1.0, -2.0], [-4.0, 0.0], [2.0, 5.0]])
+    assert (trace.peak_rad, trace.rms_rad) == (5.0, pytest.approx((50 / 6) ** 0.5))
+    assert [trace.left_rad(statistic) for statistic in ("peak", "rms")] == [5.0, trace.rms_rad]
+    run = tracking.Run("given", "PID", 3.0, trace)
+    assert run.drive_span_v == (-18.0, 10.0)
+    assert run.fastest_drive_v_s == pytest.approx(16.0 / 0.02)
+
+
+@pytest.mark.parametrize(
+    ("statistic", "convention", "left"),
+    [("peak", "per-axis", 4.0), ("peak", "radial", 4.0 * 2**0.5), ("rms", "per-axis", 3.0), ("rms", "radial", 18**0.5)],
+)
+def test_the_residual_that_a_link_sees_is_in_the_missions_statistic_and_convention(statistic, convention, left):
+    trace = a_trace([9.0, 1.0, -4.0, 1.0]) if statistic == "peak" else a_trace([9.0, 3.0, -3.0])
+    required = SimpleNamespace(residual_statistic=statistic)
+    found = tracking.residual_rad(required, SimpleNamespace(residual=convention), trace)
+    assert found == pytest.approx(left)
+
+
+def test_the_worst_run_is_that_of_the_inverse_on_its_mirror_by_the_statistic():
+    inverse = "PID + inverse"
+    sizes = {("given", "PID"): [9.0], ("given", inverse): [2.0, 3.0], ("comparison", inverse): [5.0, 4.0]}
+    runs = tuple(
+        tracking.Run(mirror, controller, float(k), a_trace([0.0, size, 0.1 * k]))
+        for (mirror, controller), each in sizes.items() for k, size in enumerate(each)
+    )  # fmt: skip
+    assert tracking.worst(runs, "peak") is runs[2]
+    assert tracking.worst(runs, "rms", tracking.Variant.COMPARISON) is runs[3]
+    tied = tuple(replace(run, trace=a_trace([0.0, 5.0, run.freq_hz])) for run in runs)
+    assert tracking.worst(tied, "rms") is tied[2]
+    assert tracking.worst(tied, "peak") is tied[1]
+
+
+def test_sines_are_tracked_on_each_mirror_that_is_wanted_and_there_under_either_controller(monkeypatch):
+    asked = []
+    monkeypatch.setattr(tracking, "track_sine", lambda *each: asked.append(each) or "trace")
+    monkeypatch.setattr(tracking.control, "no_feedforward", lambda plant: f"none of {plant}")
+    monkeypatch.setattr(tracking.control, "inverse", lambda plant: f"inverse of {plant}")
+    variant = tracking.Variant
+    there = {v: SimpleNamespace(plant=f"{v} mirror") for v in (variant.COMPARISON, variant.GIVEN)}
+    scenario = SimpleNamespace(pid_frequencies_hz=(25.0, 1.0), inverse_frequencies_hz=(15.5, 1.0), amplitude_rad=3e-4)
+    cases = SimpleNamespace(mirrors=SimpleNamespace(line_of_sight=there), setup="setup", scenario=scenario)
+    found = tracking.sine_runs(cases, (variant.STRAIGHT, variant.COMPARISON))
+    told = [("PID", 1.0), ("PID", 15.5), ("PID", 25.0), ("PID + inverse", 15.5), ("PID + inverse", 1.0)]
+    assert [(r.controller, r.freq_hz) for r in found] == told
+    assert {(r.mirror, r.trace) for r in found} == {(variant.COMPARISON, "trace")}
+    used = {"PID": "none of comparison mirror", "PID + inverse": "inverse of comparison mirror"}
+    assert asked == [
+        (f"comparison, {name}, {freq:g} Hz", "comparison mirror", "setup", used[name], 3e-4, freq)
+        for name, freq in told
+    ]
+    assert [r.mirror for r in tracking.sine_runs(cases)] == [variant.GIVEN] * 5 + [variant.COMPARISON] * 5
+
+
+@pytest.mark.parametrize(
+    ("freq_hz", "period_s", "settle_s", "samples", "steady"),
+    [(10.0, 1e-3, 0.2, 400, 200), (10.0, 1e-3, 0.25, 500, 200), (0.5, 1e-3, 0.2, 4000, 2000),
+     (300.0, 1e-3, 0.0, 203, 200),
+     (622.08, 1e-4, 0.01, 322, 209), (10.0, 1e-3, 0.0, 300, 200)],
+)  # fmt: skip
+def test_a_sine_is_whole_periods_before_and_within_its_steady_part(freq_hz, period_s, settle_s, samples, steady):
+    reference, part = simulate.sine(2e-6, freq_hz, period_s, settle_s)
+    assert (reference.shape, part) == ((samples, 1), slice(samples - steady, samples))
+    assert_allclose(reference[:, 0], 2e-6 * np.sin(2 * pi * freq_hz * period_s * np.arange(samples)), atol=1e-18)
+
+
+def test_a_loop_of_the_kernel_has_the_amplifier_of_each_actuator_and_starts_at_rest(mission):
+    of = mirror.combine(papers_mirror(PRINTED), papers_mirror(STRAIGHT))
+    controller = lti.StateSpace(np.array([[0.5]]), np.ones((1, 2)), np.ones((2, 1)), np.diag([2.0, 4.0]))
+    setup = simulate.Setup(control.Drive(-3.0, 5.0, 700.0, 250.0, 2e-3, 7e-9), control.Timing(2e-4, 4, 3), controller)
+    loop = simulate.assemble(of, setup, control.no_feedforward(of))
+    assert_allclose(loop.actuator, [[-3.0, 5.0, 2e-3, 1 - exp(-2 * pi * 700.0 * 5e-5), 250.0 * 5e-5]] * 2, rtol=1e-12)
+    assert (loop.sensor_resolution.tolist(), loop.allocation.tolist()) == ([7e-9] * 2, [[1.0, 0.0], [0.0, 1.0]])
+    assert_allclose(loop.L, [[0.5, 0.25]], rtol=1e-9)
+    assert (bool(loop.feedforward), loop.steps_per_sample, loop.delay_steps) == (False, 4, 3)
+    assert simulate.assemble(of, setup, control.inverse(of)).feedforward
+    state = simulate.at_rest(loop)
+    shapes = {"x": (1,), "error": (2,), "output": (2,), "command": (2,), "target": (2, 2), "pending": (4, 2),
+              "counts": (2, 2), "inverse_clamped": (2,), "position": (1,)}  # fmt: skip
+    assert {name: getattr(state, name).shape for name in shapes} == shapes
+    assert not any(np.any(each) for each in state if isinstance(each, np.ndarray))

@@ -642,3 +642,371 @@ def test_the_parameters_of_a_trial_are_told_in_plain_numbers():
         parameters=[SimpleNamespace(name="ki", unit="V/(rad s)"), SimpleNamespace(name="n", unit="")]
     )
     assert tuning._with(search, SimpleNamespace(values=[123_456.0, 2.5])) == "ki 123500 V/(rad s), n 2.5"
+
+
+# ------------------------------------------------------------------------------------------- parts of a search by hand
+LOG, EVEN = Parameter("a", "Hz", 2.0, 200.0), Parameter("b", "", -3.0, 5.0, log=False, gentle=1.0)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "place", "number"),
+    [(LOG, 0.0, 2.0), (LOG, 0.5, 20.0), (LOG, 1.0, 200.0), (LOG, 0.25, 2.0 * 10**0.5), (LOG, 1.5, 2000.0),
+     (EVEN, 0.0, -3.0), (EVEN, 0.25, -1.0), (EVEN, 1.0, 5.0), (EVEN, 1.25, 7.0)],
+)  # fmt: skip
+def test_a_place_is_the_share_of_a_parameters_bounds_on_its_own_scale(parameter, place, number):
+    assert search.value(parameter, place) == near(number)
+    assert search.place_of(parameter, number) == near(place)
+
+
+def test_a_value_below_the_least_stands_at_the_least():
+    assert [search.place_of(p, v) for p, v in ((LOG, 1.9), (LOG, -4.0), (EVEN, -3.5))] == [0.0] * 3
+
+
+@pytest.mark.parametrize(
+    ("number", "used"),
+    [(123456.0, 123500.0), (-0.000987651, -0.0009877), (1.00049, 1.0), (99994.0, 99990.0), (99996.0, 1e5), (0.0, 0.0)],
+)
+def test_values_are_used_to_four_digits(number, used):
+    assert search.rounded(number) == used
+
+
+@pytest.mark.parametrize(
+    ("most", "distance", "kept"), [(9, 0.1, "abd"), (2, 0.1, "ab"), (9, 0.0999, "abcd"), (9, 0.5, "a"), (0, 0.1, "")]
+)
+def test_trials_lie_apart_in_one_parameter_at_least_and_the_first_are_preferred(most, distance, kept):
+    places = {"a": (0.5, 0.5), "b": (0.5, 0.75), "c": (0.6, 0.75), "d": (0.7, 0.5), "e": (0.5, 0.5)}
+    trials = [SimpleNamespace(name=name, place=np.array(place)) for name, place in places.items()]
+    assert "".join(t.name for t in search.apart(trials, most, distance)) == kept
+
+
+@pytest.mark.parametrize(
+    ("excess", "violation", "score"), [([0.2, -0.03, 0.1], 0.03, 2.3), ([0.2, 0.0], 0.0, 2.0), ([0.5], 0.0, 2.0)]
+)
+def test_a_trial_is_scored_by_its_cost_and_ten_times_its_worst_violation(excess, violation, score):
+    verdict = judge.Verdict(0.5, 1.0, np.array([0.9, 0.4, 0.6]), np.array([3.0]))
+    trial = search.Trial(np.zeros(1), np.zeros(1), verdict, 2.0, np.array(excess))
+    assert (trial.modulus, trial.violation, trial.score) == (0.4, near(violation) if violation else 0.0, near(score))
+
+
+def fake_search(verdicts, asked, pull=0.0, parameters=(LOG, EVEN), build=lambda plant, values: tuple(values)):
+    """A search whose judge knows its verdicts by the first value."""
+
+    def several(controllers):
+        return [verdicts[c[0]] for c in controllers]
+
+    judging = SimpleNamespace(
+        open_rad2=math.exp(4.0), several=several, unstable=lambda p: judge.Verdict(p, math.inf, *NONE)
+    )
+    scope = search.Scope(lambda plants: judging, lambda plant, made: None, lambda plant, made: (plant, made))
+    return search.Search(Family("f", lambda plant: parameters, build), ["p", "q"], asked, pull, scope)
+
+
+NONE = np.zeros(3), np.zeros(2)
+MODULI, BANDS = np.array([0.7, 0.45, 0.9]), np.array([80.0, 125.0])
+
+
+@pytest.mark.parametrize(
+    ("verdict", "asked", "cost", "excess"),
+    [
+        ((0.9, 9.0, MODULI, BANDS), (0.5, 0.0), math.log(3.0), (MODULI - 0.5005) / 0.5),
+        ((0.9, 9.0, MODULI, BANDS), (0.05, 0.0), math.log(3.0), (MODULI - 0.05005) / 0.1),
+        ((0.9, 9.0, MODULI, BANDS), (0.5, 100.0), math.log(3.0),
+         [*(MODULI - 0.5005) / 0.5, math.log(0.8 / 1.001), math.log(1.25 / 1.001)]),
+        ((0.9, 9.0, MODULI, BANDS), (0.5, 1e4), math.log(3.0), [*(MODULI - 0.5005) / 0.5] + [math.log(0.1)] * 2),
+        ((0.9, 1e9, MODULI, BANDS), (0.5, 0.0), 3.0, (MODULI - 0.5005) / 0.5),
+        ((1.25, math.inf, *NONE), (0.5, 0.0), 3.25, [-1.001 - 0.25] * 3),
+        ((1.0, math.inf, *NONE), (0.5, 0.0), 3.0, [-1.001] * 3),
+        ((7.0, math.inf, *NONE), (0.5, 10.0), 4.0, [-2.001] * 3 + [math.log(0.1) - 1.0] * 2),
+    ],
+)  # fmt: skip
+def test_a_trial_costs_the_logarithm_of_its_rms_and_exceeds_what_is_asked_for_with_some_headroom(
+    verdict, asked, cost, excess
+):
+    looked = fake_search({20.0: judge.Verdict(*verdict)}, Specification(*asked))
+    trial = looked.of(np.array([20.0, 3.0]))
+    assert trial.cost == near(cost)
+    assert trial.excess.tolist() == near([*excess])
+    assert trial.place.tolist() == near([0.5, 0.75])
+    assert (looked.count, looked.trials) == (1, [trial])
+    looked.optimism = 1.5
+    stricter = looked.of(np.array([20.0, 3.0])).excess[:3]
+    assert trial.excess[:3] - stricter == near(asked[0] * 0.5 * 1.001 / max(asked[0], 0.1) * np.ones(3))
+
+
+def test_a_vigorous_value_costs_by_the_square_of_its_distance_from_the_gentle_one():
+    looked = fake_search(dict.fromkeys([20.0, 2.0], judge.Verdict(0.5, 1.0, MODULI, BANDS)), HALF, pull=0.01)
+    assert looked.of(np.array([20.0, 3.0])).cost == near(0.01 * (0.25 + 0.0625))  # b is gentle at 1, half way
+    assert looked.at(np.array([-0.5, 0.5])).cost == pytest.approx(0.0, abs=1e-12)
+    assert looked.at(np.array([-0.5, 7.0])).place.tolist() == [0.0, 1.0]
+
+
+def test_candidates_are_judged_in_their_order_and_what_cannot_be_built_is_unstable_for_the_first_reason():
+    def build(plant, values):
+        assert plant == "p"
+        if values[1] < 0.0:
+            raise ValueError(f"no {values[0]:g}")
+        return tuple(values)
+
+    known = {v: judge.Verdict(0.1 * v, v, MODULI, BANDS) for v in (2.0, 3.0, 5.0)}
+    looked = fake_search(known, HALF, build=build)
+    found = looked.of_all([np.array(v) for v in ((2.0, 1.0), (4.0, -1.0), (5.0, 0.0), (7.0, -2.0), (3.0, 2.0))])
+    assert [t.verdict.pole for t in found] == near([0.2, math.inf, 0.5, math.inf, 0.3])
+    assert [t.values[0] for t in looked.trials] == [2.0, 5.0, 3.0]
+    assert (looked.count, str(looked.reason)) == (5, "no 4")
+    margins = looked.margins(found[2])
+    assert margins == [("p", (5.0, 0.0)), ("q", (5.0, 0.0))]
+    assert looked.margins(found[2]) is margins
+    assert looked.margins(found[0]) == [("p", (2.0, 1.0)), ("q", (2.0, 1.0))]
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-3, 3e-3, 0.4, 0.997, 0.9985, 1.0])
+def test_the_derivatives_of_a_quartic_are_exact_wherever_its_points_have_to_stand(x):
+    node, quartic = 3e-3, np.polynomial.Polynomial([0.3, -1.0, 2.0, 5.0, -7.0])
+    offsets = descent._offsets(x, node)
+    assert offsets.tolist() == near([*np.arange(-2.0, 3.0) + offsets[2]])
+    assert np.min(x + node * offsets) >= -1e-12
+    assert np.max(x + node * offsets) <= 1.0 + 1e-12
+    assert abs(offsets[2]) <= 2.0
+    for order in (1, 2):
+        found = descent._weights(offsets, order) @ quartic(x + node * offsets) / node**order
+        assert found == pytest.approx(quartic.deriv(order)(x), rel=1e-6)
+
+
+def judged_by(numbers, pole=lambda place: 0.5):
+    """A search of two parameters that counts the places it is asked for."""
+    asked = []
+
+    def at_all(places):
+        asked.append([np.array(place) for place in places])
+        return [SimpleNamespace(
+            place=np.clip(p, 0.0, 1.0), cost=numbers(p)[0], excess=np.array(numbers(p)[1:]),
+            score=numbers(p)[0] + 10.0 * max(0.0, -min(numbers(p)[1:])),
+            verdict=SimpleNamespace(pole=pole(p))) for p in places]  # fmt: skip
+
+    return SimpleNamespace(at_all=at_all, at=lambda place: at_all([place])[0], asked=asked)
+
+
+def bowl(place):
+    x, y = place[0] - 0.3, place[1] - 0.6
+    return [2.0 + 3.0 * x**2 + 5.0 * y**2 + 1.5 * x * y, 0.2 + x - 2.0 * y, 0.9]
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.4), (0.0, 0.55), (1.0, 1.0), (0.31, 0.0)])
+def test_the_model_of_cost_and_near_constraints_has_their_value_slope_and_bend(place):
+    looked, at = judged_by(bowl), np.array(place)
+    model = descent._model(looked, looked.at(at), 3e-3)
+    x, y = at - [0.3, 0.6]
+    rows = 1 + (0.2 + x - 2 * y < 0.3)
+    assert model.value.tolist() == near(bowl(at)[:rows])
+    assert model.slope[:1].tolist() == [pytest.approx([6 * x + 1.5 * y, 10 * y + 1.5 * x], abs=1e-8)]
+    assert model.slope[1:].tolist() == [pytest.approx([1.0, -2.0], abs=1e-8)][: rows - 1]
+    assert model.bend[0].tolist() == [pytest.approx([6.0, 1.5], abs=1e-5), pytest.approx([1.5, 10.0], abs=1e-5)]
+    step = np.array([0.02, -0.05])
+    assert model.at(step).tolist() == pytest.approx(bowl(at + step)[:rows], abs=1e-7)
+    assert model.gradient(step)[0].tolist() == pytest.approx(
+        [6 * (x + 0.02) + 1.5 * (y - 0.05), 10 * (y - 0.05) + 1.5 * (x + 0.02)], abs=1e-6
+    )
+    assert len(looked.asked[1]) == 4 * 2 + 4
+    assert (
+        descent._model(judged_by(bowl, lambda p: 1.0 if p[1] > at[1] or p[1] < at[1] else 0.5), looked.at(at), 3e-3)
+        is None
+    )
+
+
+@pytest.mark.parametrize("start", [(0.5, 0.4), (0.05, 0.95), (0.0, 0.0), (1.0, 1.0)])
+def test_an_optimum_is_the_least_cost_at_which_no_constraint_is_missed(start):
+    """Least of the bowl where 0.2 + x - 2 y is at least 0, which the bowl's own least is."""
+    for numbers, least in ((bowl, (0.3, 0.6)), (lambda place: [bowl(place)[0], place[0] - 0.4], (0.4, 0.585))):
+        looked = judged_by(numbers)
+        rough, found = (of(looked, looked.at(np.array(start))) for of in (descent.descend, descent.settle))
+        assert rough.place.tolist() == pytest.approx(least, abs=1e-3)
+        assert found.place.tolist() == pytest.approx(least, abs=1e-7)
+
+
+@pytest.mark.parametrize(("reach", "moved"), [(0.1, 0.1), (0.02, 0.02), (0.5, 0.3)])
+def test_the_step_of_a_model_goes_no_farther_than_it_is_trusted_but_to_meet_a_constraint(reach, moved):
+    flat = descent._Quadratic(np.array([4.0]), np.array([[1.0, 0.0]]), np.zeros((1, 2, 2)))
+    assert descent._optimum(flat, np.array([0.3, 0.5]), reach)[0] == pytest.approx(-moved, abs=1e-9)
+    missed = descent._Quadratic(np.array([4.0, -0.05]), np.array([[0.0, 1.0], [1.0, 0.0]]), np.zeros((2, 2, 2)))
+    found = descent._optimum(missed, np.array([0.3, 0.5]), reach)
+    assert (
+        found.tolist() == pytest.approx([0.05, -max(reach, 0.1)], abs=1e-6) if reach < 0.5 else found[0] >= 0.05 - 1e-9
+    )
+
+
+@pytest.mark.parametrize(("dimensions", "count", "seed"), [(1, 7, 3), (3, 20, 5), (0, 4, 1)])
+def test_places_of_a_hypercube_have_one_in_each_part_of_each_bound(dimensions, count, seed):
+    found = tuning.hypercube(dimensions, count, seed)
+    assert found.shape == (count, dimensions)
+    assert (np.sort(np.floor(found * count), axis=0) == np.arange(count)[:, None]).all()
+    assert (tuning.hypercube(dimensions, count, seed) == found).all()
+    if dimensions:
+        assert (tuning.hypercube(dimensions, count, seed + 1) != found).any()
+
+
+def tried(*trials, plants=("p", "q"), asked=HALF, margins=None):
+    """A search that has tried these, each by pole, moduli, bandwidths, cost and its values of two parameters."""
+    made = [
+        SimpleNamespace(verdict=SimpleNamespace(pole=pole, bandwidths_hz=np.array(bands)), modulus=min(moduli),
+                        cost=cost, violation=max(0.0, asked.modulus_margin - min(moduli)), values=np.array(values))
+        for pole, moduli, bands, cost, values in trials
+    ]  # fmt: skip
+    return SimpleNamespace(
+        trials=made, specification=asked, count=17, plants=plants, reason="no such gain", parameters=(LOG, EVEN),
+        family=SimpleNamespace(name="PI + X"), margins=lambda t: margins or [],
+    )  # fmt: skip
+
+
+def test_candidates_meet_what_is_asked_for_just_so_and_the_cheapest_stands_first():
+    rows = [
+        (0.9, [0.5], [90.0, 80.0], 3.0, (1.0, 1.0)), (0.9, [0.4999], [90.0, 99.0], 1.0, (2.0, 1.0)),
+        (1.0, [0.9], [90.0, 99.0], 0.5, (3.0, 1.0)), (0.99, [0.6], [99.0, 79.9], 0.7, (4.0, 1.0)),
+        (0.99, [0.6, 0.7], [99.0, 85.0], 2.0, (5.0, 1.0)),
+    ]  # fmt: skip
+    found = tuning._candidates(tried(*rows, asked=Specification(0.5, 80.0)))
+    assert [t.values[0] for t in found] == [5.0, 1.0]
+    assert [t.values[0] for t in tuning._candidates(tried(*rows))] == [4.0, 5.0, 1.0]
+
+
+UNSTABLE = (1.3, [0.0], [0.0, 0.0], 9.0, (120.0, -2.0)), (1.0625, [0.0], [0.0, 0.0], 9.5, (34.5678, 0.5))
+STABLE = (0.9, [0.31], [40.0, 9.0], 2.0, (50.0, 1.0)), (0.8, [0.31], [9.0, 7.0], 1.0, (70.0, 4.0))
+REACHED = [SimpleNamespace(modulus=0.41, bandwidth_hz=33.333), SimpleNamespace(modulus=0.3125, bandwidth_hz=44.0)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "more", "words"),
+    [
+        ((), {}, "no PI + X could be built in 17 tries; the first was refused: no such gain"),
+        (UNSTABLE, {}, "no PI + X of 17 tried is stable on all 2 plants: the nearest has a pole at |z| = 1.062500 (the "
+         "limit is 1) with a 34.57 Hz, b 0.5; shorten the delay, narrow what is unknown of the plant, or take another "
+         "controller"),
+        (UNSTABLE[:1], {"plants": ("p",)}, "no PI + X of 17 tried is stable: the nearest has a pole at |z| = 1.300000 "
+         "(the limit is 1) with a 120 Hz, b -2; shorten the delay, narrow what is unknown of the plant, or take "
+         "another controller"),
+        ((*UNSTABLE, *STABLE), {"margins": REACHED}, "no PI + X of 17 tried meets the specification on all 2 plants: a "
+         "modulus margin of 0.5 is asked for, the nearest reaches 0.312 with a 70 Hz, b 4; ask for less, shorten the "
+         "delay, or take another controller"),
+        (STABLE[:1], {"margins": REACHED, "asked": Specification(0.625, 120.5), "plants": ("p",)}, "no PI + X of 17 "
+         "tried meets the specification: a modulus margin of 0.625 and a bandwidth of 120.5 Hz is asked for, the "
+         "nearest reaches 0.312 and 33.33 Hz with a 50 Hz, b 1; ask for less, shorten the delay, or take another "
+         "controller"),
+    ],
+)  # fmt: skip
+def test_a_tuning_that_fails_says_what_the_nearest_has_on_how_many_plants(rows, more, words):
+    assert tuning._refusal(tried(*rows, **more)) == words
+
+
+@pytest.mark.parametrize(
+    ("modulus", "bandwidth_hz", "asked", "bound"),
+    [
+        (0.505, 300.0, Specification(0.5, 100.0), ("modulus margin", "b at its most")),
+        (0.506, 300.0, Specification(0.5, 100.0), ("b at its most",)),
+        (0.506, 101.0, Specification(0.5, 100.0), ("bandwidth", "b at its most")),
+        (0.4, 50.0, Specification(0.5, 0.0), ("modulus margin", "b at its most")),
+    ],
+)
+def test_a_tuned_controller_is_told_by_its_first_plant_its_worst_and_all_of_them(
+    monkeypatch, modulus, bandwidth_hz, asked, bound
+):
+    """Variances of 9, 16 and 2 beside noise of 0; margins of which the second is the worst."""
+    each = ((0.95, 500.0), (modulus, 400.0), (0.94, bandwidth_hz))
+    margins = {p: SimpleNamespace(modulus=m, bandwidth_hz=b) for p, (m, b) in zip("pqr", each, strict=True)}
+    left = {"p": [4.0, 5.0], "q": [16.0, 0.0], "r": [1.5, 0.5]}
+    monkeypatch.setattr(tuning, "close", lambda plant, controller: (plant, controller))
+    monkeypatch.setattr(tuning, "h2", lambda closed: np.array([left[closed[0]], [99.0, 1.0]]))
+    monkeypatch.setattr(tuning, "loop_margins", lambda plant, controller: margins[plant])
+    built = Family(
+        "f", lambda plant: (), lambda plant, v: ("search", plant), final=lambda plant, v: ("final", plant, *v)
+    )
+    looked = SimpleNamespace(
+        family=built, plants="pqr", specification=asked, count=23, parameters=(LOG, EVEN),
+        at=lambda place: SimpleNamespace(score=5.0 if place[1] < 1.0 else 0.0),
+    )  # fmt: skip
+    found = tuning._tuned(looked, SimpleNamespace(values=(30.0, 5.0), place=np.array([0.4, 1.0]), cost=1.0))
+    assert found.controller == ("final", "p", 30.0, 5.0)
+    assert found.values == {"a": 30.0, "b": 5.0}
+    assert (found.residual_rms_rad, found.mean_rms_rad, found.worst_rms_rad) == near((3.0, 3.0, 4.0))
+    assert (found.margins, found.evaluations, found.bound_by) == (margins["p"], 23, bound)
+    assert (found.least_modulus, found.least_bandwidth_hz) == (modulus, min(bandwidth_hz, 400.0))
+
+
+def test_a_grid_is_looked_at_from_its_cheapest_on_until_one_holds_closely(monkeypatch):
+    rows = [(0.9, [0.6], [9.0, 9.0], 40.0 - k, (float(k), 1.0)) for k in range(40)]
+    looked = tried(*rows)
+    holds, asked = {20.0, 13.0}, []
+    monkeypatch.setattr(tuning, "_holds", lambda s, t: asked.append(t.values[0]) or t.values[0] in holds)
+    monkeypatch.setattr(tuning, "_tuned", lambda s, t: t.values[0])
+    monkeypatch.setattr(tuning, "_refusal", lambda s: "none of them")
+    assert (tuning._chosen(looked), asked) == (20.0, [float(k) for k in range(39, 19, -1)])
+    holds.clear()
+    asked.clear()
+    with pytest.raises(ValueError, match="none of them"):
+        tuning._chosen(looked)
+    assert len(asked) == 30
+
+
+# ------------------------------------------------------------------------------------------------ the judge by parts
+@pytest.mark.parametrize("freq", [[0.1, 0.3, 0.35, 2.0], [5.0], [1.0, 4.0]])
+def test_a_spectrum_counts_by_trapezia_and_as_at_its_lowest_frequency_down_to_zero(freq):
+    f = np.array(freq)
+    values = 3.0 + 2.0 * f
+    expected = values[0] * f[0] + np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(f))
+    assert judge.quadrature(f) @ values == near(expected)
+
+
+@pytest.mark.parametrize(("poles", "lowest"), [([0.3], 1e-4 / 20), ([0.5, np.exp(-1e-5)], 1e-5 / (2 * np.pi) / 20),
+                                               ([1.0 - 1e-16], 1e-9), ([], 1e-4 / 20)])  # fmt: skip
+def test_a_grid_begins_below_the_slowest_pole_and_ends_at_half_the_rate(poles, lowest):
+    n = len(poles)
+    system = lti.StateSpace(np.diag(poles), np.ones((n, 1)), np.ones((1, n)), np.zeros((1, 1)))
+    found = judge.grid(system, 2e-3)
+    assert (found[0], found[-1], found.size) == (near(lowest / 2e-3), near(250.0), pytest.approx(350, abs=12))
+    assert (np.diff(found) > 0.0).all()
+    assert {round(f, 6) for f in 500.0 * np.linspace(0.0, 0.5, 121)[1:]} <= {round(f, 6) for f in found.tolist()}
+
+
+def test_bands_are_one_below_a_thousandth_of_the_rate_and_ten_above_by_plant():
+    period = 1e-3
+    edges = np.geomspace(1e-3, 0.5, 11) / period
+    first = np.array([0.5, 0.9, edges[0], edges[3] * 1.01, edges[3] * 1.02, edges[9] * 1.1, 500.0])
+    second = np.array([edges[2] * 1.01, 400.0])
+    assert judge._bands([first, second], period).tolist() == [0, 2, 3, 5, 7, 8]
+    assert judge._bands([0.9999 * edges], period).tolist() == [*range(11)]
+    assert judge._bands([edges[1:]], period).tolist() == [*range(9)]
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 4])
+def test_responses_of_controllers_of_any_order_are_those_of_their_matrices(order):
+    random = np.random.default_rng(order)
+    shapes = (order, order), (order, 2), (1, order), (1, 2)
+    several = [lti.StateSpace(*(0.4 * random.standard_normal(shape) for shape in shapes)) for _ in range(3)]
+    points = np.exp(1j * np.array([0.1, 1.3, 2.9, np.pi]))
+    found = judge.responses(judge._Stack.of(several), points)
+    assert found.shape == (3, 4, 2)
+    for s, rows in zip(several, found, strict=True):
+        for z, row in zip(points, rows, strict=True):
+            expected = s.C @ np.linalg.solve(z * np.eye(order) - s.A, s.B) + s.D
+            np.testing.assert_allclose(row, expected[0], rtol=1e-9)
+        np.testing.assert_allclose(judge.response(s, points), rows, rtol=1e-12)
+    stack = judge._Stack.of(several).some(np.array([2, 0]))
+    assert (stack.D[0] == several[2].D).all()
+    assert (stack.B[1] == several[0].B).all()
+
+
+@pytest.mark.parametrize(
+    ("plants", "words"),
+    [
+        ((), "nothing to tune for: give at least the nominal plant"),
+        ((PLAIN, replace(PLAIN, period_s=5e-4)), "plants of different control periods, 0.0002 to 0.0005 s: a "
+         "controller has one rate"),
+        ((PLAIN, replace(PLAIN, system=replace(PLAIN.system, A=np.diag(np.linspace(0.2, 1.0, PLAIN.system.order))))),
+         "a plant has a pole at |z| = 1.000000000 (the limit is 1): it or its disturbance is not stationary; give the "
+         "disturbance some damping"),
+        ((replace(PLAIN, system=replace(PLAIN.system, B=PLAIN.system.B * [1.0, 0.0, 0.0, 0.0])),),
+         "the plant has no disturbance: without a loop its residual is 0; give it one to reject"),
+    ],
+)  # fmt: skip
+def test_a_judge_refuses_plants_that_it_cannot_judge_on(plants, words):
+    with pytest.raises(ValueError) as refused:
+        judge.Judge(plants)
+    assert str(refused.value) == words

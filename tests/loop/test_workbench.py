@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from microrad import mirror as mirrors
 from microrad.core import lti
 from microrad.loop import control, coupled_study, sine_run
 from microrad.loop.disturbance import first_order, fit_spectrum
+from microrad.loop.pointing_loop import ensemble, traces
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.loop.workbench import Controller, Loop, tune
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
@@ -489,3 +493,95 @@ def test_a_run_of_seconds_that_are_not_finite_is_refused(seconds):
         LOOP.simulate(SLOW, seconds)
     with pytest.raises(ValueError, match=f"a run of 1 s that settles for {seconds:g} s: give finite seconds"):
         LOOP.ensemble(SLOW, 1, 1.0, settle_s=seconds)
+
+
+def test_a_loop_has_each_of_its_numbers_where_the_simulation_takes_them():
+    loop = replace(ALONE, gauge_noise_rad=7e-9, drive_range_v=(-4.0, 9.0), slew_v_s=350.0, steps_per_sample=5,
+                   sensor_delay_s=50e-6)  # fmt: skip
+    found, period = loop.parts, 1.25e-4
+    assert found.drive == control.Drive(-4.0, 9.0, 3e3, 350.0, 0.0, 0.0)
+    assert found.timing == control.Timing(period, 5, 1)
+    assert found.optical == OpticalSensor(0.3e-6, math.inf, 0.0, 1, 2)
+    assert found.gauge == StrainGauge(7e-9, 0.0)
+    assert found.disturbances == ((HUM, ROLL),)
+    assert (found.mirror is STRAIGHT, found.optics.tolist(), found.held, found.unknown) == (True, [[1.3]], None, ())
+    assert SKEW.parts.disturbances == ((HUM, ROLL),) * 2
+    assert (SKEW.parts.gauge, SKEW.parts.drive.slew_v_s, len(SKEW.parts.references)) == (None, math.inf, 2)
+    plain = Loop(mirror=STRAIGHT, rate_hz=2e3)
+    assert plain.parts.drive == control.Drive(-math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
+    assert (plain.parts.timing, plain.parts.optical) == (
+        control.Timing(5e-4, 10, 0), OpticalSensor(0.0, math.inf, 0.0, 1, 0)
+    )  # fmt: skip
+    assert (plain.parts.disturbances, plain.parts.gauge) == (((),), None)
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_run_follows_each_sample_of_its_reference_and_holds_the_last(axes):
+    loop = LOOP if axes == 1 else ON_TWO
+    quiet = replace(loop, vibration=(), sensor_noise_rad=0.0)
+    samples = 1e-6 * np.arange(1.0, 1.0 + 3 * axes).reshape(3, axes)
+    found = quiet.simulate(Controller.pid(0.0, 5e6, rate_hz=10e3, axes=axes), 8e-4, reference_rad=samples)
+    assert_allclose(found.reference_rad, samples[[0, 1, 2, 2, 2, 2, 2, 2]], rtol=1e-12)
+    if axes == 1:
+        again = quiet.simulate(SLOW, 8e-4, reference_rad=samples[:, 0].tolist())
+        assert (again.error_rad == found.error_rad).all()
+    assert not quiet.simulate(Controller.pid(0.0, 5e6, rate_hz=10e3, axes=axes), 8e-4).reference_rad.any()
+
+
+def test_an_ensemble_is_of_the_runs_seconds_and_seed_that_are_asked_for(monkeypatch):
+    asked = []
+    monkeypatch.setattr(ensemble, "simulate", lambda *given, **more: asked.append((*given[2:], more)) or "runs")
+    monkeypatch.setattr(traces, "trace", lambda *given: asked.append(given[2:]) or "run")
+    assert LOOP.ensemble(SLOW, 7, 2.5, settle_s=0.5, seed=11, on_progress=print) == "runs"
+    assert LOOP.ensemble(SLOW, 3, 1.5) == "runs"
+    assert LOOP.simulate(SLOW, 3.5, seed=4) == "run"
+    spans = [Span(2.5, 0.5, 11), Span(1.5, 0.0, 0), Span(3.5, 0.0, 4)]
+    assert [each[0] for each in asked] == spans
+    assert [each[1] for each in asked[:2]] == [7, 3]
+    assert asked[0][2] == {"on_progress": print}
+
+
+def test_what_is_tuned_for_is_handed_on_and_comes_back_as_a_controller_of_the_loop(monkeypatch):
+    asked, told = [], []
+    one = control.AxisController("own", lti.StateSpace(np.eye(1), np.ones((1, 2)), np.ones((1, 1)), np.zeros((1, 2))),
+                                 np.zeros((1, 1)))  # fmt: skip
+    found = SimpleNamespace(controller=one, values={"zero": 3.0}, margins="margins", bound_by=("zero at its most",))
+    monkeypatch.setattr(control, "tune", lambda *given, **more: asked.append((*given, more)) or found)
+    monkeypatch.setattr(Loop, "residual_rms_rad", lambda self, made: made.name)
+    gauged = replace(LOOP, gauge_noise_rad=1e-9)
+    for kind in ("PI", "PI + notch", "resonant damping", "disturbance observer", "LQG"):
+        tuned = tune(gauged, kind, modulus_margin=0.375, seed=5, on_progress=told.append)
+        assert (tuned.controller.name, tuned.residual_rms_rad) == (kind, kind)
+        assert (tuned.controller.system, tuned.controller.rate_hz) == (one.system, 10e3)
+        assert (tuned.values, tuned.margins, tuned.bound_by) == ({"zero": 3.0}, "margins", ("zero at its most",))
+        family, plants, wanted, more = asked.pop()
+        assert (family.name, len(plants), plants[0].has_gauge) == (kind, 1, True)
+        assert (wanted, more) == (control.Specification(0.375), {"seed": 5, "on_progress": told.append})
+    tune(LOOP)
+    family, _, wanted, more = asked.pop()
+    assert (family.name, wanted, more["seed"]) == ("LQG", control.Specification(0.5), 0)
+
+
+@pytest.mark.parametrize("kind", ["LQG", "H-infinity"])
+def test_a_controller_of_several_axes_is_tuned_as_one_and_told_once(monkeypatch, kind):
+    asked, said = [], []
+    made = control.WholeController(kind, OF_TWO.system, OF_TWO.anti_windup)
+    monkeypatch.setattr(coupled_study, "tuned_whole", lambda *given: asked.append(given) or (made, {"a": 2.0}))
+    tuned = tune(ON_TWO, kind, modulus_margin=0.25, on_progress=lambda *each: said.append(each))
+    ((family, plants, wanted),) = asked
+    assert (family.name, len(plants), plants[0].axes, wanted) == (kind, 1, 2, control.Specification(0.25))
+    assert said == [(1, 1, f"tune {kind}")]
+    assert (tuned.controller.name, tuned.controller.rate_hz, tuned.values) == (kind, 10e3, {"a": 2.0})
+    assert_allclose(tuned.residual_rms_rad, ON_TWO.residual_rms_rad(OF_TWO), rtol=1e-9)
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_a_pid_of_several_axes_is_the_same_on_each_and_acts_on_no_other(axes):
+    one = control.pid(control.Gains(300.0, 4e6, 0.05, 2e-4), 1.0 / 8e3)
+    made = Controller.pid(0.3e3, 4e6, 0.05, axes=axes, **GAINS)
+    assert (made.name, made.rate_hz) == ("PID", 8e3)
+    for key in "ABCD":
+        assert_allclose(getattr(made.system, key), np.kron(np.eye(axes), getattr(one, key)), rtol=1e-12)
+    assert_allclose(made.anti_windup, np.kron(np.eye(axes), one.B / one.D), rtol=1e-9)
+    plain = Controller.pid(5.0, rate_hz=100.0)
+    assert (plain.system.order, plain.system.D.tolist()) == (0, [[5.0]])

@@ -4,6 +4,7 @@ import re
 import sys
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ from numpy.testing import assert_allclose
 import several_axes
 from campaign_files import MIRROR
 from microrad.loop import control, coupled_study, worst_case
+from microrad.loop.disturbance import Misalignment
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.design import design_plant, whole_plant
 from microrad.loop.pointing_loop.linear import close, stationary
-from microrad.loop.pointing_loop.loop import assemble, assemble_whole, decoupling
+from microrad.loop.pointing_loop.loop import assemble, assemble_whole, decoupling, nominal_axis_gain
 from microrad.loop.pointing_loop.windows import windowed_errors
 from microrad.loop.worst_case import APE, Extent, Simulated, Subject, batch, in_time, search
 from microrad.mirror import coupled, from_table, spread
@@ -337,3 +339,148 @@ def test_the_last_third_of_the_larger_axis_is_held_against_the_middle_one_and_th
     error[3:7], error[7:] = 0.0, 0.0
     error[5, 1], error[8, 0], error[9, 1] = -middle, -last, 0.3 * last
     assert in_time.course(error, 2.0) == said
+
+
+class Known:
+    """Three parameters with two numbers behind them; a number below -2.5 of the second is no mirror."""
+
+    parameters = ("gain", "pole", "zero")
+    rows = np.array([[1.0, 0.0], [0.6, 0.8], [0.0, 1.0]])
+
+    def moved(self, normals):
+        return None if normals[1] < -2.5 else search.Moved(tuple(normals.tolist()), self.rows @ normals)
+
+    def drawn(self, count, seed):
+        each = 1.5 * np.random.default_rng(seed).standard_normal((count, 2))
+        return [search.Moved(tuple(normals.tolist()), self.rows @ normals) for normals in each]
+
+
+def known_subject(asked):
+    """Rms of two indices, modulus and pole by the two numbers; unstable where the first is beyond 2.2."""
+
+    def figures(mirrors, indices, threads):
+        asked.append((len(mirrors), [i.kind for i in indices], threads))
+        a, b = np.array([m.mirror for m in mirrors]).reshape(-1, 2).T
+        wild = a > 2.2
+        rms = np.column_stack([np.where(wild, np.inf, 5.0 + 0.5 * a + 0.1 * b), np.where(wild, np.inf, 2.0 - 0.3 * b)])
+        return worst_case.Figures(
+            rms, np.where(wild, 0.0, 0.5 - 0.05 * a - 0.02 * b), np.where(wild, 1.0 + 0.1 * a, 0.9)
+        )
+
+    simulated = SimpleNamespace(on=lambda mirror, pole: ("in time", mirror, round(pole, 9)))
+    return SimpleNamespace(
+        known=Known(), theory="theory", controller=SimpleNamespace(name="PI"), figures=figures, simulated=simulated
+    )
+
+
+def test_the_worst_case_is_the_worst_of_own_draws_and_corners_each_with_where_it_is(monkeypatch):
+    asked, said = [], []
+    monkeypatch.setattr(search, "close", lambda theory, controller: (theory, controller.name))
+    monkeypatch.setattr(search, "refuse_unstable", said.append)
+    subject, indices = known_subject(asked), (APE, ErrorIndex("RPE", 0.1))
+    extent = Extent(draws=9, most_sensitive=2, sigmas=3.0)
+    found = worst_case.worst_case(subject, 4, indices, extent, 3, lambda *each: said.append(each))
+    assert said == [
+        ("theory", "PI"), (0, 4, "sensitivity of the parameters"), (1, 4, "9 mirrors drawn"), (2, 4, "corners"),
+        (3, 4, "worst case in time"),
+    ]  # fmt: skip
+    assert asked == [(7, ["APE", "RPE"], 3), (9, ["APE", "RPE"], 3), (2, ["APE", "RPE"], 3)]
+    changes = {
+        "gain": ((0.1, 0.0), 0.1), "pole": ((0.076, 0.12), 0.092), "zero": ((0.02, 0.15), 0.04),
+    }  # fmt: skip
+    ranked = sorted(changes, key=lambda name: -max(*changes[name][0], changes[name][1]))
+    assert ranked == ["zero", "pole", "gain"]
+    assert [s.parameter for s in found.most_sensitive] == ranked[:2]
+    for each in found.most_sensitive:
+        assert (*each.rms, each.modulus) == pytest.approx((*changes[each.parameter][0], changes[each.parameter][1]))
+    assert (found.corners, found.corners_left_out, found.unstable_corners) == (2, 2, 1)
+    draws = 1.5 * np.random.default_rng(4).standard_normal((9, 2))
+    wild = draws[:, 0] > 2.2
+    assert found.unstable_draws == np.sum(wild) > 0
+    assert (found.nominal_rad, found.nominal_modulus) == (pytest.approx((5.0, 2.0)), pytest.approx(0.5))
+    assert [w.value for w in found.largest_rad] == [np.inf, np.inf]
+    assert found.smallest_modulus.value == 0.0
+    for worst in (*found.largest_rad, found.smallest_modulus):
+        assert worst.sigmas == pytest.approx({"gain": 3.0, "pole": 4.2, "zero": 3.0})
+    assert found.verified_in_time == ("in time", (3.0, 3.0), 1.3)
+    assert (found.controller, found.extent, found.indices) == ("PI", extent, indices)
+    rms = np.sort(np.where(wild, np.inf, 5.0 + 0.5 * draws[:, 0] + 0.1 * draws[:, 1]))
+    assert (found.drawn_rad[0].median, found.drawn_rad[0].worse) == pytest.approx((rms[4], rms[8]))
+    modulus = np.sort(np.where(wild, 0.0, 0.5 - 0.05 * draws[:, 0] - 0.02 * draws[:, 1]))
+    assert (found.drawn_modulus.median, found.drawn_modulus.worse) == pytest.approx((modulus[4], modulus[0]))
+
+
+def test_parameters_that_matter_to_first_order_are_told_by_slopes_along_the_numbers_behind_them(monkeypatch):
+    """Of the second number the slope is that of one step up and a step of the mirror itself in place of none."""
+    subject = known_subject([])
+    own = subject.known.moved(np.zeros(2))
+    monkeypatch.setattr(search, "CLOSELY", 2)
+    slopes = np.array([[0.1, 0.0, 0.1], [0.02, 0.15, 0.04]])
+    matters = np.max(np.abs(Known.rows @ slopes), axis=1)
+    assert search._likely(subject, own, (APE, APE), 1) == sorted(np.argsort(-matters)[:2].tolist())
+    figures, ranked = search._ranked(subject, own, (APE, APE), 1)
+    assert (len(ranked), figures.modulus[0]) == (2, pytest.approx(0.5))
+
+
+@pytest.mark.parametrize(
+    ("pole", "samples"),
+    [(0.5, 300), (1.5, 300), (0.99, round(np.log(1e3) / -np.log(0.99))), (1.002, round(np.log(1e3) / np.log(1.002))),
+     (1.0, 20_000), (0.99999, 20_000), (0.0, 300)],
+)  # fmt: skip
+@pytest.mark.parametrize("at_rest", [True, False])
+def test_a_loop_in_time_lasts_until_its_slowest_pole_has_decayed_a_thousand_times(monkeypatch, pole, samples, at_rest):
+    runs, period = [], 2e-4
+    loop = SimpleNamespace(timing=SimpleNamespace(period_s=period), references=[SimpleNamespace(point_ahead_rad=3e-6)])
+    monkeypatch.setattr(in_time.Simulated, "_from_offset", lambda self: loop)
+    monkeypatch.setattr(in_time, "rest_gain", lambda model: f"rest {model}")
+    monkeypatch.setattr(in_time, "slow_gain", lambda model: f"slow {model}")
+    monkeypatch.setattr(in_time, "linearised", lambda mirror, gains: (mirror.name, gains))
+    monkeypatch.setattr(in_time.parts, "without", lambda loop, name: SimpleNamespace(name=name, **vars(loop)))
+    monkeypatch.setattr(in_time, "replace", lambda loop, mirror: (getattr(loop, "name", "all"), mirror))
+    monkeypatch.setattr(in_time, "straightened", lambda controller, loop: f"straight {controller}")
+    monkeypatch.setattr(in_time, "trace", lambda *run: runs.append(run) or SimpleNamespace(error_rad=run[0][0]))
+    monkeypatch.setattr(in_time, "course", lambda error, offset: (error, offset))
+    mirror = SimpleNamespace(bank=("a", "b"), name="bent")
+    found = in_time.Simulated(loop, "PI", at_rest).on(mirror, pole)
+    kind, span = "rest" if at_rest else "slow", in_time.Span(pytest.approx(period * samples), 0.0, 0)
+    assert runs == [
+        (("limits", ("bent", [f"{kind} a", f"{kind} b"])), "straight PI", span), (("all", mirror), "PI", span)
+    ]  # fmt: skip
+    assert (found.linear, found.with_hysteresis) == (("limits", 3e-6), ("all", 3e-6))
+    assert (found.pole, found.seconds, found.offset_rad) == (pole, pytest.approx(period * samples), 3e-6)
+    assert found.theory == ("settles" if pole < 1.0 else "grows")
+
+
+@pytest.mark.parametrize(
+    ("linear", "bent", "pole", "agrees"),
+    [("settles", "settles", 0.9, True), ("settles", "grows", 0.9, False), ("grows", "grows", 1.0, True),
+     ("grows", "settles", 1.1, False), ("settles", "settles", 1.1, False), ("grows", "grows", 0.99, False)],
+)  # fmt: skip
+def test_theory_agrees_with_a_loop_in_time_where_both_runs_do_what_it_says(linear, bent, pole, agrees):
+    assert in_time.InTime(pole, linear, bent, 1.0, 1e-6).agrees is agrees
+
+
+@pytest.mark.parametrize(
+    ("limits", "own_range", "field", "share"),
+    [((-4.0, 6.0), (-9.0, 9.0), np.inf, 4.0), ((-8.0, 3.0), (-5.0, 9.0), np.inf, 3.0),
+     ((-8.0, 7.0), (-5.0, 6.0), np.inf, 5.0),
+     ((-8.0, 7.0), (-5.0, 2.0), np.inf, 2.0), ((-8.0, 7.0), (-5.0, 6.0), 1e-5, None)],
+)  # fmt: skip
+def test_an_offset_is_a_quarter_of_what_the_drives_reach_or_the_sensor_sees_without_anything_else(
+    file, limits, own_range, field, share
+):
+    subject, _ = subject_of(file)
+    loop = subject.theory
+    drive = replace(loop.drive, minimum_v=limits[0], maximum_v=limits[1])
+    optical = replace(loop.optical, field_of_view_rad=field)
+    here = replace(loop, drive=drive, drive_range_v=own_range, optical=optical, unknown=(Misalignment(1e-6, 0.0),))
+    found = replace(subject.simulated, loop=here)._from_offset()
+    offset = 0.25 * (1e-5 if share is None else nominal_axis_gain(loop) * share)
+    assert [r.point_ahead_rad for r in found.references] == [pytest.approx(offset, rel=1e-12)]
+    assert (found.disturbances, found.unknown, found.optical.noise_rad, found.drive.drive_resolution_v) == (
+        ((),),
+        (),
+        0,
+        0,
+    )
+    assert (found.drive.maximum_v, found.optical.field_of_view_rad) == (limits[1], field)

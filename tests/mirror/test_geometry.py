@@ -451,3 +451,81 @@ def test_an_item_that_is_not_of_the_choices_is_named_with_where_it_stands():
     with pytest.raises(ValueError) as refused:
         Geometry("optical", layout="three-axis")
     assert str(refused.value) == 'geometry: layout is \'three-axis\'; choose "two-axis" or "tripod"'
+
+
+def budget(**changes):
+    lines = tuple(geometry.Line(name, value, "rad", "b", "s", "r") for name, value in (("one", 3e-4), ("two", 4e-4)))
+    own = {
+        "name": "x",
+        "lines": lines,
+        "magnification": 8.0,
+        "mirror_per_line_of_sight": 2.5,
+        "travel_angle": "optical",
+    }
+    return geometry.StrokeBudget(**own | {"travel_rad": 5e-3, "usable_travel_rad": 4e-3} | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "numbers", "fits"),
+    [
+        ({}, "7e-4 5e-4 1.75e-3 1.25e-3 2e-3 .8 2.5e-4 7.5e-4 1.142857142857 1.6 9.142857142857 12.8", (True, True)),
+        (
+            {"mirror_per_line_of_sight": 4.0},
+            "7e-4 5e-4 2.8e-3 2e-3 2e-3 .8 -8e-4 0 .714285714286 1 5.714285714286 8",
+            (False, True),
+        ),
+        (
+            {"usable_travel_rad": 2e-3, "magnification": 3.0},
+            "7e-4 5e-4 1.75e-3 1.25e-3 1e-3 .4 -7.5e-4 -2.5e-4 .571428571429 .8 1.714285714286 2.4",
+            (False, False),
+        ),
+        (
+            {"mirror_per_line_of_sight": 0.0},
+            "7e-4 5e-4 0 0 2e-3 .8 2e-3 2e-3 inf inf inf inf",
+            (True, True),
+        ),
+    ],
+)
+def test_what_a_budget_of_two_lines_says_in_numbers(changes, numbers, fits):
+    own = budget(**changes)
+    names = (
+        "total_rad total_rss_rad needed_rad needed_rss_rad available_rad usable_share margin_rad margin_rss_rad ratio "
+        "ratio_rss largest_magnification largest_magnification_rss"
+    )
+    found = [getattr(own, name) for name in names.split()]
+    assert found == pytest.approx([float(v) for v in numbers.split()], rel=1e-9, abs=1e-18)
+    assert (own.fits, own.fits_rss) == fits
+
+
+@pytest.mark.parametrize(
+    ("name", "label"), [("x", "axis x"), ("y", "axis y"), ("actuator 2", "actuator 2"), ("left", "left")]
+)
+def test_an_axis_is_called_one_and_an_actuator_by_its_name(name, label):
+    assert budget(name=name).label == label
+
+
+@pytest.mark.parametrize("angle", ["optical", "mechanical"])
+def test_the_budget_of_a_turned_tripod_has_the_lines_of_each_actuator(angle):
+    """From the rows of the pseudo-inverse: what each actuator does for a line of sight, without piston."""
+    wanted = StrokeDemand((3e-4, 1e-4), (7e-5, 2e-5), (4e-5, 5e-5), (6e-6, 8e-6), point_ahead_on_mirror=True)
+    tripod = Geometry("mechanical", 0.6, 5.0, 0.35, ((1.0, 0.1), (-0.05, 0.9)), "tripod", 0.04)
+    found = stroke_budget(tripod, wanted, travel_rad=0.02, travel_angle=angle)
+    turn = np.array([[math.cos(0.35), -math.sin(0.35)], [math.sin(0.35), math.cos(0.35)]])
+    seen = turn @ np.diag([2.0, 2.0 * math.cos(0.6)]) @ [[1.0, 0.1], [-0.05, 0.9]] / 5.0
+    tilts = -2.0 / 3.0 * np.array([np.cos(THIRDS), np.sin(THIRDS)])
+    rows = np.linalg.pinv(tilts) @ np.linalg.inv(seen) * (2.0 if angle == "optical" else 1.0)
+    assert [each.name for each in found] == ["actuator 1", "actuator 2", "actuator 3"] == [e.label for e in found]
+    for each, row in zip(found, rows, strict=True):
+        size = np.hypot(*row)
+        along = np.abs(row) / size
+        assert each.mirror_per_line_of_sight == pytest.approx(size, rel=1e-9)
+        values = [along @ pair for pair in ((3e-4, 1e-4), (7e-5, 2e-5), (4e-5, 5e-5), (6e-6, 8e-6))]
+        assert [line.value for line in each.lines] == pytest.approx(values, rel=1e-9)
+        assert [line.name for line in each.lines] == [
+            *("Body pointing", "Point-ahead", "Bias and alignment", "Line-of-sight rate lag")
+        ]
+        assert {line.regime for line in each.lines} == {"both axes at their worst together"}
+        assert each.lines[1].basis == (
+            f"half range at the line of sight: x 70 µrad, y 20 µrad; along ({along[0]:.3g}, {along[1]:.3g})"
+        )
+        assert (each.travel_angle, each.travel_rad, each.usable_travel_rad) == (angle, 0.02, 0.02)

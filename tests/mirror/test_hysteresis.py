@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
-from math import exp, inf, log, pi
+from math import exp, inf, log, nan, pi
 
 import numpy as np
 import pytest
@@ -610,3 +610,186 @@ def test_what_a_model_cannot_do_is_said_in_all_words(ask, message):
     with pytest.raises(ValueError) as refused:
         ask()
     assert str(refused.value) == message
+
+
+@pytest.mark.parametrize(
+    ("drive", "step_s", "message"),
+    [
+        ([[1.0]], 0.1, "drive_v has shape (1, 1): give one row of finite samples, shape (samples,)"),
+        ([], 0.1, "drive_v has shape (0,): give one row of finite samples, shape (samples,)"),
+        ([0.5, -inf], 0.1, "drive_v has shape (2,): give one row of finite samples, shape (samples,)"),
+        ([1.0, "a"], 0.1, "drive_v: no array of real numbers; give numbers, or lists of them that are equally long"),
+        ([1.0], 0.0, "step_s is 0.0 s: give the time between two samples, above 0"),
+        ([1.0], inf, "step_s is inf s: give the time between two samples, above 0"),
+    ],
+)
+@pytest.mark.parametrize("model", [Creep((1e-6, 2e-6), (0.1, 2.0)), OPERATOR, UNLIKE], ids=["creep", "plays", "bw"])
+def test_a_drive_that_is_none_is_told_by_its_name_whatever_is_asked(model, drive, step_s, message):
+    with pytest.raises(ValueError) as refused:
+        model.response(drive, step_s)
+    assert str(refused.value) == message
+
+
+def fields_of(*models):
+    return [(model, each) for model in models for each in model.__dataclass_fields__.values()]
+
+
+@pytest.mark.parametrize(
+    ("model", "each"), fields_of(UNLIKE, OPERATOR, Creep((1e-6,), (0.1,))), ids=lambda v: getattr(v, "name", "")
+)
+def test_each_number_of_a_model_is_checked_under_its_own_name(model, each):
+    """Of another shape, or not finite; a limit and a reach may be infinite, if they lie above."""
+    one = each.type is float
+    cls = type(model)
+    spoilt = object.__new__(cls)
+
+    def told(value):
+        for name in cls.__dataclass_fields__:
+            object.__setattr__(spoilt, name, value if name == each.name else getattr(model, name))
+        with pytest.raises(ValueError) as refused:
+            spoilt.check()
+        return str(refused.value)
+
+    wanted = "has shape (2,): give one number" if one else "has shape (): give a row of numbers"
+    assert told((1.0, 2.0) if one else 1.0) == f"{each.name} of the {cls.KIND} model {wanted}"
+    for value in (nan, -inf) if each.name in ("rate_limit_v_s", "reach_v") else (nan, -inf, inf):
+        shown = f"{value}" if one else f"[{value}]"
+        assert (
+            told(value if one else (value,)) == f"{each.name} of the {cls.KIND} model is {shown}: give finite numbers"
+        )
+
+
+@pytest.mark.parametrize(
+    ("model", "drives"),
+    [
+        (UNLIKE, "-0.17192932 -0.63108927 -0.26227943 -0.44021441"),
+        (replace(UNLIKE, d2_s_v=0.0, exponent=1.0), "-0.1672039 -0.62282173 -0.25868306 -0.43846743"),
+        (replace(UNLIKE, d1_rad_v=-7e-5), "0.1208394 0.50719716 0.27724332 0.39921269"),
+        (replace(OPERATOR, reach_v=inf, widening_s=0.0), "-0.25 -0.9 -0.4 -0.65"),
+    ],
+    ids=["rate", "no rate", "falling", "plays"],
+)
+def test_an_output_below_0_has_its_inverse_as_one_above(model, drives):
+    wanted = np.array([-1.0, -4.0, -2.0, -3.0]) * 1e-5
+    found = model.inverse(wanted, 1e-3)
+    assert_allclose(found, [float(v) for v in drives.split()], rtol=1e-6)
+    assert_allclose(model.response(found, 1e-3), wanted, atol=6e-9)
+
+
+@pytest.mark.parametrize(
+    ("epsilon", "exponent", "wrong_way", "settled", "slope"),
+    [
+        (-3e-5, 1.0, 1.774998e-06, 2.307692e-05, -3.153846e-05),
+        (-3e-5, 1.7, 8.595673e-07, 1.762942e-05, -3.153846e-05),
+        (-6e-5, 1.0, 1.887763e-05, 4.615385e-05, -1.330769e-04),
+        (-6e-5, 1.7, 1.080452e-05, 3.525885e-05, -1.330769e-04),
+        (-9e-5, 1.0, 4.274649e-05, 6.923077e-05, -2.346154e-04),
+        (-9e-5, 1.7, 2.999442e-05, 5.288827e-05, -2.346154e-04),
+        (-2e-4, 1.7, 1.248409e-04, 1.175295e-04, -6.069231e-04),
+    ],
+)
+def test_the_worse_of_two_unlike_branches_says_how_far_a_model_moves_the_wrong_way(
+    epsilon, exponent, wrong_way, settled, slope
+):
+    """With epsilon beyond d1 and below it; the same turned over."""
+    model = BoucWen(7e-5, 0.0, epsilon, 0.0, 2.5, 0.7, inf, 0.0, 0.3, -0.2, exponent)
+    for each, sign in ((model, 1.0), (hysteresis.sign_reversed(model), -1.0)):
+        assert each.wrong_way_rad == pytest.approx(wrong_way, rel=1e-6)
+        assert each.settled_rad == pytest.approx(settled, rel=1e-6)
+        assert sign < 0.0 or each.reversal_slope_rad_v() == pytest.approx(slope, rel=1e-6)
+        assert each.admissible_rate_v_s == 0.0 and not each.admissible
+
+
+@pytest.mark.parametrize(
+    ("output_rad", "gain"),
+    [
+        (0.0, 0.0),
+        (1e-6, 1e-6 / 0.525),
+        (2e-5, 2e-5 / 1.0),
+        (4e-5, 4e-5 / 1.4),
+        (1.2e-4, 1.2e-4 / 3.0),
+        (1.3e-4, 1.3e-4 / (3.0 + 1e-5 / 5.5e-5)),
+        (inf, 5.5e-5),
+    ],
+)
+def test_plays_without_a_gain_at_rest_have_the_secant_of_each_piece(output_rad, gain):
+    """Thresholds of 0.5, 1 and 3 V end at 0, 20 and 120 urad."""
+    model = PrandtlIshlinskii((0.5, 1.0, 3.0), (4e-5, 1e-5, 5e-6))
+    assert hysteresis.secant_gain(model, output_rad) == pytest.approx(gain, rel=1e-12)
+    assert hysteresis.gain_only(model, output_rad).d1_rad_v == pytest.approx(gain, rel=1e-12)
+    assert hysteresis.rest_gain(model) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("model", "amplitude_v", "freq_hz", "samples", "numbers"),
+    [
+        (UNLIKE, 0.4, 3.0, 8, "0.1649825 0 4.806966e-05 1.446134e-06 3.659743e-06"),
+        (UNLIKE, 3.0, 20.0, 48, "0.02357656 0 4.10766e-04 9.974149e-05 -5.236239e-06"),
+        (UNLIKE, 11.0, 70.0, 33, "0.006992283 29 1.5281e-03 5.256401e-04 -5.866792e-06"),
+        (OPERATOR, 3.0, 20.0, 48, "0.05595372 0 2.83787e-04 7.101798e-05 6.525741e-07"),
+        (OPERATOR, 11.0, 70.0, 33, "0.01755408 29 1.035545e-03 3.586508e-04 1.88e-06"),
+        (replace(OPERATOR, widening_s=0.0), 11.0, 70.0, 33, "0.0159017 29 1.036829e-03 3.597708e-04 3e-06"),
+    ],
+)
+def test_loops_of_few_samples_within_and_beyond_the_limit_in_numbers(model, amplitude_v, freq_hz, samples, numbers):
+    loop = model.loop(amplitude_v, freq_hz, samples)
+    width, clamped, size, fourth, sixth = (float(v) for v in numbers.split())
+    assert (loop.width, np.ptp(loop.output_rad)) == pytest.approx((width, size), rel=1e-6)
+    assert (loop.output_rad[3], loop.hysteresis_rad[5]) == pytest.approx((fourth, sixth), rel=1e-6)
+    assert loop.clamped == clamped and loop.drive_v.size == samples
+
+
+@pytest.mark.parametrize(
+    ("changes", "size"),
+    [
+        ({"exponent": 1.0}, 0.0),
+        ({"epsilon_rad_v": 0.0}, 0.0),
+        ({}, 2.5 / 1.3e-5),
+        ({"epsilon_rad_v": 4e-5, "alpha_1_v": 0.5}, 1.25e4),
+        ({"exponent": 3.0}, 2.5 / 1.3e-5),
+    ],
+)
+def test_the_size_of_h_goes_to_the_kernel_where_an_exponent_needs_it(changes, size):
+    model = replace(UNLIKE, **changes)
+    assert model.row[10:] == pytest.approx((model.exponent - 1.0, size), rel=1e-12)
+    assert model.row[:10] == tuple(getattr(model, name) for name in list(model.__dataclass_fields__)[:10])
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (
+            PrandtlIshlinskii((0.5, 1.0), (1e-5, 2e-5)),
+            "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
+            "inverse; identify it again with more samples near the reversals",
+        ),
+        (
+            PrandtlIshlinskii((0.0, 1.0), (0.0, 2e-5)),
+            "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
+            "inverse; identify it again with more samples near the reversals",
+        ),
+        (
+            PrandtlIshlinskii((0.0, 1.0), (1e-5, 2e-5), polynomial_rad=(1e-6, 0.0, 0.0), reach_v=3.0),
+            "the Prandtl-Ishlinskii model has a polynomial beside its plays, and the inverse knows plays alone; "
+            "identify the axis without one",
+        ),
+    ],
+)
+def test_plays_without_an_inverse_say_why_and_what_to_do(model, message):
+    for ask in (model.inverted, lambda: model.inverse([1e-6], 0.1)):
+        with pytest.raises(ValueError) as refused:
+            ask()
+        assert str(refused.value) == message
+
+
+@pytest.mark.parametrize(
+    ("freq_hz", "words"), [(1234.567, "1234.57 Hz: 9"), (0.25, "0.25 Hz: 9"), (2e6, "2e+06 Hz: 9"), (20.0, "20 Hz: 9")]
+)
+def test_a_loop_says_its_frequency_its_samples_and_its_width(freq_hz, words):
+    loop = BoucWen(7e-5, 0.0, -1.3e-5, 0.0, 2.5, -0.7).loop(1.0, freq_hz, 9)
+    assert repr(loop) == f"<HysteresisLoop at {words} samples, {100 * loop.width:.2f}% wide>"
+    found = loop.to_xarray()
+    assert dict(found.sizes) == {"sample": 9}
+    assert [found[name].attrs["long_name"] for name in ("drive", "output", "hysteresis")] == [
+        *("drive about the bias", "output about the bias", "hysteresis h")
+    ]

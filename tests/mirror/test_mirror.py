@@ -1047,3 +1047,229 @@ def test_the_summary_of_a_mirror_with_faults_of_each_kind_word_by_word(tmp_path)
     ]
     assert [root.in_band for root in summary.roots] == [False, False]
     assert (summary.flat_band_hz, summary.normalise_at_hz, summary.rate_limit_v_s) == ((160.0, 160.0), 200.0, 512.5)
+
+
+IMPROPER = (
+    "the linear part of mirror 'm' has a numerator of {} and a denominator of {} coefficients: give one that is proper "
+    "and stable (every root of the denominator left of the imaginary axis) and that passes a constant"
+)
+ROWS = "mirror 'm': numerator and denominator have to be rows of finite coefficients"
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom", "message"),
+    [
+        ([1, 2, 3], [1, 2], IMPROPER.format(3, 2)),
+        ([1], [1, 0], IMPROPER.format(1, 2)),
+        ([1], [1, -2], IMPROPER.format(1, 2)),
+        ([1], [1, 2, 3, 400], IMPROPER.format(1, 4)),
+        ([1, 0], [1, 2, 3], IMPROPER.format(2, 3)),
+        ([1], [0, 1, 2], IMPROPER.format(1, 3)),
+        ([1], [[1, 2]], ROWS),
+        ([], [1, 2], ROWS),
+        ([1], [nan, 2], ROWS),
+        ([1, inf], [1, 2, 3], ROWS),
+        ([1], [1e-200, 1, 2], "the denominator of mirror 'm' begins with 1e-200, nothing beside the others"),
+        (
+            "x",
+            [1, 2],
+            "numerator of mirror 'm': no array of real numbers; give numbers, or lists of them that are equally long",
+        ),
+        (
+            [1],
+            ["y"],
+            "denominator of mirror 'm': no array of real numbers; give numbers, or lists of them that are equally long",
+        ),
+    ],
+)
+def test_a_linear_part_of_polynomials_is_refused_in_all_words(top, bottom, message):
+    with pytest.raises(ValueError) as refused:
+        Mirror.of(1e-5, top, bottom, name="m")
+    assert str(refused.value) == message
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (
+            lambda m: m.response([], 1.0),
+            "drive_v has shape (0,): mirror 'm' takes finite samples of shape (samples, 1)",
+        ),
+        (
+            lambda m: m.response([[[1.0]]], 1.0),
+            "drive_v has shape (1, 1, 1): mirror 'm' takes finite samples of shape (samples, 1)",
+        ),
+        (lambda m: m.response(1.0, 1.0), "drive_v has shape (): mirror 'm' takes finite samples of shape (samples, 1)"),
+        (
+            lambda m: m.response(["a"], 1.0),
+            "drive_v: no array of real numbers; give numbers, or lists of them that are equally long",
+        ),
+        (lambda m: m.response([1.0], -0.25), "step_s is -0.25 s: give the time between two samples, above 0"),
+        (lambda m: m.response([1.0], nan), "step_s is nan s: give the time between two samples, above 0"),
+        (lambda m: m.frequency_response(inf), "freq_hz has shape (1,): give one row of finite frequencies"),
+        (
+            lambda m: m.frequency_response("a"),
+            "freq_hz: no array of real numbers; give numbers, or lists of them that are equally long",
+        ),
+        (
+            lambda m: replace(m, bouc_wen=(BoucWen(1e-5, 0, 1e-5, 5.0, 0.3, -5.3, 1e3),)).response([0, 1e3, 0], 1e-3),
+            "mirror 'm' gives no finite output to this drive at a step of 0.001 s",
+        ),
+        (
+            lambda m: Mirror.of_system(lti.StateSpace(*(np.array([[v]]) for v in (0.0, 1.0, 2.0, 3.0))), "q"),
+            "the linear system of mirror 'q' is not stable: every pole has to have a decay",
+        ),
+    ],
+)
+def test_a_mirror_of_one_gain_refuses_in_all_words_what_makes_no_answer(ask, message):
+    with pytest.raises(ValueError) as refused:
+        ask(Mirror.of(1e-5, name="m"))
+    assert str(refused.value) == message
+
+
+def test_a_gain_behind_no_linear_part_is_static_whatever_number_divides_it():
+    for bottom in ([7.0], 7.0, (7,)):
+        m = Mirror.of(3e-5, [2.0], bottom)
+        assert (m.name, m.A.shape, m.K.tolist(), m.D.tolist()) == ("mirror", (0, 0), [[1.0]], [[0.0]])
+        assert m.response([1.0, -2.0], 0.1).tolist() == [3e-5, -6e-5]
+        assert m.inverse == m.bouc_wen == (BoucWen(3e-5, 0.0, 0.0, 0.0, 0.0, 0.0),)
+        assert m.frequency_response(3.0).tolist() == [[[3e-5]]]
+
+
+@pytest.mark.parametrize(
+    ("system", "axes", "actuators"),
+    [
+        ((np.array([[-1.0]]), np.ones((1, 2)), np.ones((3, 1)), np.arange(6.0).reshape(3, 2)), 3, 2),
+        ((np.zeros((0, 0)), np.ones((0, 2)), np.ones((3, 0)), np.arange(6.0).reshape(3, 2)), 3, 2),
+        ((np.diag([-1.0, -5.0]), np.array([[1.0], [2.0]]), np.array([[3.0, 4.0]]), np.array([[0.5]])), 1, 1),
+    ],
+)
+def test_a_linear_system_is_a_mirror_of_its_matrices_without_a_bank(system, axes, actuators):
+    A, B, C, D = system
+    m = Mirror.of_system(lti.StateSpace(*system), "q")
+    for name, matrix in zip("ABCD", system, strict=True):
+        assert_array_equal(getattr(m, name), matrix)
+    assert (m.name, m.axes, m.actuators, m.bank, m.inverse, m.inverse_creep) == ("q", axes, actuators, (), (), ())
+    shapes = [(len(A), 0), (0, len(A)), (0, actuators), (axes, 0)]
+    assert [getattr(m, name).shape for name in "EFGK"] == shapes
+    at = 2j * pi * 0.7
+    seen = C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D
+    assert_allclose(m.frequency_response([0.0, 0.7])[1], seen, rtol=1e-12)
+
+
+HEAD = (
+    'name = "n"\ntravel = "3 mrad"\ncomposition = "cascade"\nrate_limit = "1234567 V/s"\nbias = "5 V"\n'
+    'drive_min = "0 V"\ndrive_max = "10 V"\n'
+)
+TWO_PLAYS = '[prandtl_ishlinskii]\nthresholds = ["0 V", "1 V"]\nweights = ["40 urad/V", "10 urad/V"]\n'
+
+
+def test_the_summary_of_a_gain_below_0_has_its_size_at_dc_and_in_the_band(tmp_path):
+    """-300 s - 6e5 over s^2 + 100 s + 250000, flat at 10 Hz alone as its pair lies at 80 Hz."""
+    path = tmp_path / "mirror.toml"
+    path.write_text(
+        f"{HEAD}{TWO_PLAYS}[linear]\nnumerator = [-300.0, -6e5]\ndenominator = [1.0, 100.0, 250000.0]\n"
+        'normalise_at = "20 Hz"\nexcited_from = "10 Hz"\nexcited_to = "250 Hz"\n'
+    )
+    summary = mirror_summary.summarise(load_mirror(path).mirror)
+    assert str(summary).split("\n") == [
+        "n: cascade, Prandtl-Ishlinskii hysteresis",
+        "  linear part divided by -2.56318, its magnitude at 20 Hz",
+        "  gain at DC 2.40000, in the flat band from 10 to 10 Hz 2.43892 to 2.43892",
+        "  pole at 79.58 Hz, damping 0.100",
+        "  zero at 318.3 Hz, damping 1.000",
+        "  valid to 1.235e+06 V/s",
+        "  warning: zero at 318 Hz lies outside the excited band (10 to 250 Hz): extrapolated",
+    ]
+    assert [(r.kind, r.in_band) for r in summary.roots] == [("pole", True), ("zero", False)]
+    assert summary.normalised_by == pytest.approx(-2.563183493, rel=1e-9) and summary.dc_gain == pytest.approx(2.4)
+
+
+def test_the_summary_of_roots_on_both_sides_of_the_band_and_of_the_plane_word_by_word(tmp_path):
+    path = tmp_path / "mirror.toml"
+    widening = TWO_PLAYS.replace("weights", 'widening = "2e-4 s"\nweights')
+    path.write_text(
+        f'{HEAD}{widening}[linear]\npoles = ["20 Hz", "400 Hz", "35 Hz"]\npole_dampings = [1.0, 0.2, 0.5]\n'
+        'zeros = ["7 Hz", "90 Hz"]\nzero_dampings = [0.3, -1.0]\nnormalise_at = "50 Hz"\nexcited_from = "10 Hz"\n'
+        'excited_to = "250 Hz"\n'
+    )
+    summary = mirror_summary.summarise(load_mirror(path).mirror)
+
+    def pair(f, of, damping):
+        return abs(complex(1 - (f / of) ** 2, 2 * damping * f / of))
+
+    def size(f):
+        below = pair(f, 400.0, 0.2) * pair(f, 35.0, 0.5) * abs(complex(1, f / 20))
+        return pair(f, 7.0, 0.3) * abs(complex(1, f / 90)) / below
+
+    rest, low = 1 / size(50.0), size(10.0) / size(50.0)
+    assert str(summary).split("\n") == [
+        "n: cascade, Prandtl-Ishlinskii hysteresis",
+        "  linear part divided by 1.00000, its magnitude at 50 Hz",
+        f"  gain at DC {rest:.5f}, in the flat band from 10 to 10 Hz {low:.5f} to {low:.5f}",
+        "  pole at 20 Hz, damping 1.000",
+        "  pole at 400 Hz, damping 0.200",
+        "  pole at 35 Hz, damping 0.500",
+        "  zero at 7 Hz, damping 0.300",
+        "  zero at 90 Hz, damping -1.000",
+        "  rate in the hysteresis held at 1.235e+06 V/s; clamped samples are counted",
+        "  warning: pole at 400 Hz lies outside the excited band (10 to 250 Hz): extrapolated",
+        "  warning: zero at 7 Hz lies outside the excited band (10 to 250 Hz): drift fitted as dynamics",
+        f"  warning: gain at DC {rest:.5f} is not the gain in the band, {low:.5f} to {low:.5f}",
+    ]
+
+
+@pytest.mark.parametrize(("often", "axes", "unroll"), [(False, 1, 0), (True, 1, 1), (True, 2, 0), (False, 2, 0)])
+def test_loops_are_unrolled_for_one_axis_that_is_simulated_often(often, axes, unroll):
+    one = mirror.assemble("m", "cascade", RESONANT[0], PLAYS, CREEP)
+    assert not mirror.unrolled(one)
+    plant = mirror.discretise(one if axes == 1 else mirror.combine(one, one), STEP, often=often)
+    assert isinstance(plant.states, tuple) == bool(unroll)
+
+
+@pytest.mark.parametrize("composition", ["static", "cascade", "additive"])
+def test_an_answer_is_the_same_by_rows_and_by_columns(composition):
+    one = mirror.assemble("m", composition, RESONANT[0], WIDENING, CREEP)
+    plant = mirror.discretise(one, STEP)
+    drive, output = zigzag(5)[:, None], np.empty((120, 1))
+    mirror.respond(plant, mirror.at_rest(plant), drive, output, np.empty((120, 0)))
+    assert_allclose(output, run(one, drive)[0], atol=one_femtoradian)
+    assert_allclose(one.response(drive[:, 0], STEP), output[:, 0], atol=one_femtoradian)
+
+
+@pytest.mark.parametrize(
+    ("zero_hz", "low", "high", "band", "shown"),
+    [
+        (50, "1", "250", (1.0, 40.0), "from 1 to 40 Hz"),
+        (390, "1.2345", "25.6", (1.2345, 25.6), "from 1.2345 to 26 Hz"),
+        (20, "12.3456", "250", (12.3456, 40.0), "from 12.3456 to 40 Hz"),
+    ],
+)
+def test_a_zero_ends_no_flat_band_and_the_edges_are_told(tmp_path, zero_hz, low, high, band, shown):
+    """Two pairs of poles from 400 Hz on, and a pair of zeros far below them or beside."""
+    path = tmp_path / "mirror.toml"
+    path.write_text(
+        f'{HEAD}{TWO_PLAYS}[linear]\npoles = ["400 Hz", "900 Hz"]\npole_dampings = [0.2, 0.3]\n'
+        f'zeros = ["{zero_hz} Hz"]\nzero_dampings = [0.1]\n'
+        f'normalise_at = "20.125 Hz"\nexcited_from = "{low} Hz"\nexcited_to = "{high} Hz"\n'
+    )
+    summary = mirror_summary.summarise(load_mirror(path).mirror)
+    assert_allclose(summary.flat_band_hz, band, rtol=1e-12)
+    text = str(summary)
+    assert "\n  linear part divided by 1.00000, its magnitude at 20.125 Hz\n" in text
+    assert f", in the flat band {shown} " in text
+    outside = [f"pole at {hz} Hz lies outside the excited band ({low} to {high} Hz): extrapolated" for hz in (400, 900)]
+    assert [each for each in summary.warnings if "pole" in each] == outside
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom"),
+    [([3.0], [0.5, 2.0]), ([1.0, -4.0], [1.0, 3.0, 2.0]), ([2.0, 8.0], [3.0, 5.0, 7.0, 2.0]), ([-0.25], [1.0, 1.0])],
+)
+def test_polynomials_of_any_gain_at_rest_have_that_of_the_hysteresis_with_creep_beside_it(top, bottom):
+    m = Mirror.of(PLAYS, top, bottom, creep=Creep((5e-6,), (0.2,)), name="p")
+    s = 2j * pi * np.array([0.0, 0.3])
+    shape = np.polyval(top, s) / np.polyval(bottom, s) * bottom[-1] / top[-1]
+    expected = hysteresis.slow_gain(PLAYS) * shape + 5e-6 / (1 + 0.2 * s)
+    assert_allclose(m.frequency_response([0.0, 0.3])[:, 0, 0], expected, rtol=1e-9)
+    assert (m.name, m.inverse, m.inverse_creep) == ("p", (PLAYS,), (Creep((5e-6,), (0.2,)),))

@@ -684,3 +684,18 @@ def test_what_a_file_would_refuse_is_no_moved_mirror(read, text, names, factors)
     mirror = read(text + table(names, [0.5] * len(names)))
     assert mirror_spread.moved(mirror, np.array(factors)) is None
     assert mirror_spread.moved(mirror, np.ones(len(names))) is not None
+
+
+@pytest.mark.parametrize(
+    ("names", "factors", "moved"),
+    [
+        (["bouc_wen.d1"], [0.0], False),
+        (["bouc_wen.d1"], [1e-3], True),
+        (["bouc_wen.d1", "bouc_wen.delta"], [1.5, 0.05], True),
+        (["linear.poles.1", "creep.weights"], [1.0, 0.0], False),
+        (["linear.pole_dampings.1"], [0.01], True),
+    ],
+)
+def test_a_factor_of_0_turns_a_value_and_a_small_one_does_not(read, names, factors, moved):
+    found = mirror_spread.moved(read(BOUC_WEN + table(names, [0.5] * len(names))), np.array(factors))
+    assert (found is not None) == moved

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from drawn import lines_of
+from drawn import lines_of, one_text, outline
 from microrad import report
 from microrad.lab.identify.coupled import Candidate, CoupledIdentification
 from microrad.lab.identify.linear.amplitude import AmplitudeDependence
@@ -888,4 +888,215 @@ def test_the_figures_of_unlike_errors_have_a_point_for_each_model_and_a_curve_fo
         "Panel 0 1 x=<title=drive, rms (mV) most=6> y=<title=main resonance (Hz) most=6>",
         ("Line x=[100 200] y=[79.58 78.2] colour=#0072B2 dash=: width=0.8 marker=o y_arms=[[0.2 0.1] [0.2"),
         "  0.1]]",
+    ]
+
+
+# --------------------------------------------------------------------------------------------------- pages as a whole
+def test_a_page_of_several_channels_has_every_part_with_its_tables_in_their_order():
+    found = found_of()
+    assert outline(
+        coupled_page._lead(found, "one more"), *coupled_page._views(found, coupled_figures(found))
+    ) == one_text("""
+= True: Hysteretic stiffness, order 3 (47 parameters) predicts 2 records that no fit has seen with an error of 5.23
+  % of the rms output.
+It leaves 82.7 nm rms (5.23 % of the output) at 100 mV rms drive and 165 nm rms (5.23 % of the output) at 200 mV rms
+  drive. The worst is y1 of small <3>.npy: 5.75 %. This rests on small <3>.npy and large <3>.npy; 6 other records
+  were fitted. The smaller of two whose difference may be chance.
+one more
+# Warnings
+- Output y1 drifts.
+- Few realisations.
+# Which model
+[error-over-parameters]
+| -: model / parameters / held-out error / at 100 mV rms / at 200 mV rms /  [0, 5] best [1] cards
+hysteretic stiffness, order 5 / 81 / 5.17 % / 5.17 % / 5.17 % / within noise
+hysteretic stiffness, order 3 / 47 / 5.23 % / 5.23 % / 5.23 % / chosen
+coupled linear, order 3 / 17 / 22 % / 22 % / 22 % /
+per axis, order 2 / 11 / 52.3 % / 52.3 % / 52.3 % /
+- coupled linear, order 3: its search had not settled
+Models that were refused, with the reason:
+- hysteretic stiffness, order 9: the fitted mirror <runs> away
+# Error on held-out records
+| -: drive, rms / output (nm) / error (nm) / of output / best linear (nm) / noise (nm) / worst output [0, 6] brief
+  [0, 2, 3, 4, 6] cards
+100 mV / 1580 / 82.7 / 5.23 % / 15.9 / 15.8 / <b>sensor</b>, 5.23 %
+200 mV / 3160 / 165 / 5.23 % / 15.9 / 15.8 / <b>sensor</b>, 5.23 %
+Per cent are of the rms output, the mean over outputs in power. The best linear model is the measured response of
+  that amplitude: what it leaves of the fitted records is distortion and noise, and no linear model leaves less.
+  Noise is what changes from period to period.
+| -: held-out record / error / <b>sensor</b> / y1 [0] cards
+small <3>.npy / 5.26 % / 4.71 % / 5.75 %
+large <3>.npy / 5.23 % / 5.23 % / 5.23 %
+# Response
+[response]
+# Dependence on the amplitude
+From the smallest to the largest amplitude the gain changes by +5.2 % and the main resonance by −1.38 Hz.
+[amplitude]
+| -: drive, rms / gain (µm/V) / main resonance (Hz) / ± (Hz) / damping ratio [0]
+100 mV / 2 / 79.58 / 0.2 / 0.04
+200 mV / 2.104 / 78.2 / 0.1 / 0.04
+# Poles
+| -: pole at rest / frequency (Hz) / ± (Hz) / damping ratio (1) / ± (1) / excited /  [0, 5, 6]
+pair / 79.64 / 0.32 / 0.04 / 0.002 / yes /
+real pole / 143.2 / 4.8 / 1 /  / yes /
+± is one standard error; it says nothing of what the model leaves out.
+# Error by output and band
+[bands]
+| The same as numbers: rms in each band (nm): drive, output / rms of / 3.9 to 40 Hz / 40 to 1230 Hz [0, 1]
+100 mV, <b>sensor</b> / error / 31.4 / 41.8
+100 mV, <b>sensor</b> / best linear / 3.49 / 9.92
+100 mV, <b>sensor</b> / noise / 3.14 / 9.49
+100 mV, y1 / error / 62.8 / 83.7
+100 mV, y1 / best linear / 6.13 / 19
+100 mV, y1 / noise / 6.24 / 19
+200 mV, <b>sensor</b> / error / 62.8 / 83.7
+200 mV, <b>sensor</b> / best linear / 3.49 / 9.92
+200 mV, <b>sensor</b> / noise / 3.13 / 9.5
+200 mV, y1 / error / 126 / 167
+200 mV, y1 / best linear / 6.14 / 19
+200 mV, y1 / noise / 6.25 / 19
+# Where it holds
+| -: actuator / bias / lowest drive / highest drive / fastest rate [0]
+piezo 1 / 5 V / 4.25 V / 5.75 V / 15 kV/s
+piezo 2 / 4 V / 3.5 V / 4.5 V / 10 kV/s
+The drive acts 200 µs ± 5 µs late. That delay belongs to the recording chain (converters, filters, amplifier), not
+  to the mirror: the mirror file holds it apart.
+# What the mirror file does not hold
+- Creep: nothing below 3.9 Hz was excited, so what the mirror does within minutes of a step was not seen.
+- Modes above 400 Hz: nothing was excited there.
+- A geometry: where the displacements are measured was not stated, so tilts and piston cannot be had from them.
+- Which way round the channels are: a reversed sensor and two swapped channels are another mirror, and show only
+  against signs that are stated, or against the places of four sensors or more.
+- Uncertainty: standard errors of the parameters are not known.
+""")
+
+
+def test_a_stopped_ladder_without_responses_says_so_in_each_part():
+    found = found_of(
+        responses=(None, None),
+        modelled=(None, None),
+        dependence=None,
+        stopped=True,
+        warnings=(),
+        refused=(),
+        noise_rms=np.full((2, 2), np.nan),
+        reason="",
+    )
+    views = coupled_page._views(found)
+    assert outline(coupled_page._lead(found), *views[:5], views[6]) == one_text("""
+= None: Stopped before the last model, so the choice so far: hysteretic stiffness, order 3 (47 parameters) predicts
+  2 records that no fit has seen with an error of 5.23 % of the rms output.
+It leaves 82.7 nm rms (5.23 % of the output) at 100 mV rms drive and 165 nm rms (5.23 % of the output) at 200 mV rms
+  drive. The worst is y1 of small <3>.npy: 5.75 %. This rests on small <3>.npy and large <3>.npy; 6 other records
+  were fitted.
+# Warnings
+- No warnings.
+# Which model
+The ladder was stopped before its last model: what is chosen is the smallest within noise so far.
+| -: model / parameters / held-out error / at 100 mV rms / at 200 mV rms /  [0, 5] best [1] cards
+hysteretic stiffness, order 5 / 81 / 5.17 % / 5.17 % / 5.17 % / within noise
+hysteretic stiffness, order 3 / 47 / 5.23 % / 5.23 % / 5.23 % / chosen
+coupled linear, order 3 / 17 / 22 % / 22 % / 22 % /
+per axis, order 2 / 11 / 52.3 % / 52.3 % / 52.3 % /
+- coupled linear, order 3: its search had not settled
+No model was refused.
+# Error on held-out records
+| -: drive, rms / output (nm) / error (nm) / of output / best linear (nm) / noise (nm) / worst output [0, 6] brief
+  [0, 2, 3, 4, 6] cards
+100 mV / 1580 / 82.7 / 5.23 % /  /  / <b>sensor</b>, 5.23 %
+200 mV / 3160 / 165 / 5.23 % /  /  / <b>sensor</b>, 5.23 %
+Per cent are of the rms output, the mean over outputs in power. The best linear model is the measured response of
+  that amplitude: what it leaves of the fitted records is distortion and noise, and no linear model leaves less.
+  Noise is what changes from period to period.
+| -: held-out record / error / <b>sensor</b> / y1 [0] cards
+small <3>.npy / 5.26 % / 4.71 % / 5.75 %
+large <3>.npy / 5.23 % / 5.23 % / 5.23 %
+# Response
+No amplitude has enough records for a response of its own: as many realisations with different drives as there are
+  actuators, or broadband drives of one actuator at a time.
+# Dependence on the amplitude
+The ladder was stopped before gain and resonance were compared over the amplitude.
+# Error by output and band
+| The same as numbers: rms in each band (nm): drive, output / rms of / 3.9 to 40 Hz / 40 to 1230 Hz [0, 1]
+100 mV, <b>sensor</b> / error / 31.4 / 41.8
+100 mV, y1 / error / 62.8 / 83.7
+200 mV, <b>sensor</b> / error / 62.8 / 83.7
+200 mV, y1 / error / 126 / 167
+""")
+
+
+def test_a_gain_that_falls_and_a_resonance_without_an_error_are_told_with_a_minus():
+    of = AmplitudeDependence(
+        np.array([0.25, 0.5, 2.0]),
+        np.array([4.0e-6, 3.5e-6, 3.0e-6]),
+        np.array([80.0, 82.5, 91.25]),
+        np.array([0.5, np.nan, 0.25]),
+        np.array([0.01, 0.025, 0.5]),
+    )
+    assert outline(coupled_page._dependence(found_of(dependence=of), {})) == one_text("""
+# Dependence on the amplitude
+From the smallest to the largest amplitude the gain changes by −25 % and the main resonance by +11.2 Hz.
+| -: drive, rms / gain (µm/V) / main resonance (Hz) / ± (Hz) / damping ratio [0]
+250 mV / 4 / 80 / 0.5 / 0.01
+500 mV / 3.5 / 82.5 / not known / 0.025
+2 V / 3 / 91.25 / 0.25 / 0.5
+""")
+
+
+def test_thirteen_records_are_folded_and_the_first_five_outputs_are_columns():
+    base = candidate("one", "per axis", 11, 0.1)
+    share = 0.01 * np.arange(1.0, 79.0).reshape(13, 6)
+    outputs = tuple(Output(f"y{k}", "angle") for k in range(6))
+    own = replace(base, record_share=share, model=SimpleNamespace(outputs=outputs))
+    found = found_of(candidates=(own,), chosen="one", held_out=tuple(f"r{k}.npy" for k in range(13)))
+    assert outline(coupled_page._records(found)) == one_text("""
+| All 13 held-out records: held-out record / error / y0 / y1 / y2 / y3 / y4 [0] cards
+r0.npy / 3.89 % / 1 % / 2 % / 3 % / 4 % / 5 %
+r1.npy / 9.65 % / 7 % / 8 % / 9 % / 10 % / 11 %
+r2.npy / 15.6 % / 13 % / 14 % / 15 % / 16 % / 17 %
+r3.npy / 21.6 % / 19 % / 20 % / 21 % / 22 % / 23 %
+r4.npy / 27.6 % / 25 % / 26 % / 27 % / 28 % / 29 %
+r5.npy / 33.5 % / 31 % / 32 % / 33 % / 34 % / 35 %
+r6.npy / 39.5 % / 37 % / 38 % / 39 % / 40 % / 41 %
+r7.npy / 45.5 % / 43 % / 44 % / 45 % / 46 % / 47 %
+r8.npy / 51.5 % / 49 % / 50 % / 51 % / 52 % / 53 %
+r9.npy / 57.5 % / 55 % / 56 % / 57 % / 58 % / 59 %
+r10.npy / 63.5 % / 61 % / 62 % / 63 % / 64 % / 65 %
+r11.npy / 69.5 % / 67 % / 68 % / 69 % / 70 % / 71 %
+r12.npy / 75.5 % / 73 % / 74 % / 75 % / 76 % / 77 %
+""")
+    few = replace(found, held_out=found.held_out[:12], candidates=(replace(own, record_share=share[:12, :5]),))
+    assert outline(coupled_page._records(few)).split("\n")[0] == one_text("""
+| -: held-out record / error / y0 / y1 / y2 / y3 / y4 [0] cards
+""")
+
+
+def test_the_head_of_a_page_of_several_channels_counts_them_and_says_where_records_come_from(monkeypatch):
+    seen = []
+    monkeypatch.setattr(coupled_page, "page_of", lambda *args, **more: seen.append((args, more)) or "page")
+    given = {"mirror_file": Path("a<b>.toml"), "mirror_text": "text", "title": "A title"}
+    for virtual in (True, False):
+        coupled_page.coupled_identification_page(found_of(), **given, virtual=virtual)
+    heads = [[*args[:2], str(args[2]), args[3][0].blocks[1:], len(args[4]), *more.values()] for args, more in seen]
+    digest = "982d9e3eb996f559e633f4d194def3761d909f5a3b647d1a851fead67c32c9d1"
+    said = "The recordings are those of the virtual bench: nothing here was measured on a mirror."
+    head = ["A title", "identification", "2 actuators and 2 outputs, mirror file <code>a&lt;b&gt;.toml</code>"]
+    assert heads == [
+        [*head, (said,), 10, digest, "microrad identify", "virtual bench"],
+        [*head, (), 10, digest, "microrad identify", ""],
+    ]
+
+
+def test_a_terminal_has_both_files_at_its_end_and_only_those_that_there_are():
+    for files, last in (
+        ({}, "1 refused model: see the report, or --json."),
+        ({"mirror_file": Path("a.toml")}, "a.toml written (hysteretic stiffness, order 3)."),
+        ({"report_file": Path("b.html")}, "b.html written: what was found, with pictures."),
+    ):
+        text = report.coupled_identification_text(found_of(), 100, **files)
+        assert text.endswith(last)
+    both = report.coupled_identification_text(found_of(), 100, mirror_file=Path("a.toml"), report_file=Path("b.html"))
+    assert both.split("\n")[-2:] == [
+        "b.html written: what was found, with pictures.",
+        "a.toml written (hysteretic stiffness, order 3).",
     ]

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete, lfilter
 
-from drawn import figure_of, lines_of
+from drawn import figure_of, lines_of, one_text, outline
 from drawn import plain as rounded_numbers
 from microrad import report
 from microrad.core.kernels import play_response
@@ -1421,3 +1421,202 @@ def test_large_frequencies_and_errors_are_told_without_powers_of_ten():
     assert words.error_text(ns(held_out_rms_percent=12.34), 10e-3) == "1230 µrad rms (12.3 %)"
     worst = words.worst_text(ns(worst="a.csv", worst_rms_rad=1.234e-3, worst_peak_rad=9.9996e-3), 10e-3)
     assert worst.endswith("a.csv, with 1230 µrad rms (12.3 %) and 10000 µrad at most.")
+
+
+# ------------------------------------------------------------------------------------------------ the page as a whole
+def plays(k, sign=1.0):
+    """Play operators of which each number is unlike those of others."""
+    return made(
+        PrandtlIshlinskiiFit,
+        thresholds_v=np.array([0.0, 0.5 * k]),
+        sign=sign,
+        weights_rad_per_v=np.array([2e-3 * k, 3e-3]),
+        standard_errors_rad_per_v=np.array([1e-5 * k, 2e-5]),
+        condition_number=12.5 * k,
+        colour_inflation=3.25 * k,
+    )
+
+
+def a_found(**changes):
+    """Two recordings judged and one that served the linear part alone, of which the identification keeps no more."""
+    named = [f"{chr(97 + k)}/r{k}.csv" for k in range(3)]
+    roles = ("loops", "validation", "broadband")
+    sources = [ns(path=p, sha256=f"{k}f", role=roles[k], fitted=10 + k, held_out=20 + k) for k, p in enumerate(named)]
+    time = np.arange(64) / 64.0
+    kept = [
+        ns(
+            path=named[k],
+            sha256=f"{k}f",
+            drive=(3.0 + (k + 1) * np.sin(2 * np.pi * 4 * (k + 1) * time))[:, None],
+            rate_hz=64.0 * (k + 1),
+            samples=64,
+            step_s=1.0 / (64.0 * (k + 1)),
+            findings=[ns(kind="clipped", message=f"says {k}", refused=bool(k))],
+        )
+        for k in range(2)
+    ]
+    predictions = [
+        ns(start=1, split=3 - 2 * k, residual_rad=1e-6 * np.array([9.0, 1.0, 2.0, 3.0 + k, 4.0]), clamped=7 * k)
+        for k in range(2)
+    ]
+    scores = [
+        ns(
+            model=f"m{k}",
+            fit_rms_percent=1.5 - k / 8,
+            fit_peak_percent=4.5 - k,
+            held_out_rms_percent=2.5 - k,
+            held_out_peak_percent=6.5 - k,
+        )
+        for k in range(2)
+    ]
+    line = ns(
+        model="straight line",
+        fit_rms_percent=7.5,
+        fit_peak_percent=8.5,
+        held_out_rms_percent=2.0,
+        held_out_peak_percent=9.5,
+    )
+    given = {
+        "recordings": kept, "sources": sources, "predictions": [None, predictions], "scores": scores, "chosen": "m1",
+        "fits": [plays(1), plays(2, -1.0)], "straight_line": line, "span_rad": 2.5e-4, "units": ns(volts=10.0),
+        "linear": None, "refused": [Refused("m7", "too short")], "reason": "A reason.",
+        "residual": ns(white=True, independent=False, bound=0.125, outside=(0.04, 0.5)),
+    }  # fmt: skip
+    return ns(**given | changes)
+
+
+def test_a_page_of_an_identification_has_each_number_of_its_recordings_and_models(monkeypatch):
+    monkeypatch.setattr(identification_page.words, "warnings", lambda found, written: [f"of {written}"])
+    views = identification_page._views(a_found(), "m0", (), {name: ns(name=name) for name in PICTURES})
+    assert outline(*views) == one_text("""
+# Warnings and refusals
+- of m0
+Models that these recordings cannot support:
+- m7: too short
+# Recordings
+| -: file / serves as / drive / sample rate / fitted / held out / duration [0, 1, 2] brief [0, 1, 4, 5]
+r0.csv / loops / 4 Hz, ± 10 V about 30 V / 64 Hz / 10 / 20 / 1 s
+r1.csv / validation / 16 Hz, ± 20 V about 30 V / 128 Hz / 11 / 21 / 500 ms
+r2.csv / broadband /  /  / 12 / 22 /
+What the checks of the recordings noticed:
+- r0.csv, clipped: says 0
+- r1.csv, clipped (accepted): says 1
+[excitation]
+# Linear part
+No model with a linear part was asked for, so the broadband recordings were not used.
+# Loops
+[loops]
+Error of m1 on each recording:
+| -: file / drive / fitted, rms / unseen, rms / unseen, rms / rate-clamped [0, 1] brief [0, 2, 3, 4]
+r0.csv / 4 Hz, ± 10 V about 30 V / 1.58 µrad / 3.54 µrad / 1.41 % / 0
+r1.csv / 16 Hz, ± 20 V about 30 V /  / 3.04 µrad / 1.22 % / 7
+# Time response
+No broadband recording was used: there is no linear model to compare.
+# Residuals
+[residuals]
+The residual is white: 4 % of its autocorrelations lie outside ± 0.12. It follows the drive: 50 % of the cross-
+  correlations lie outside; 5 % would be noise.
+[tests]
+# Parameters
+# m0, in the mirror file
+| -: parameter / value / ± standard error / unit / note [0, 3, 4]
+weight at 0 V / 2 / 0.01 / mrad/V /
+weight at 0.5 V / 3 / 0.02 / mrad/V /
+The weights are a non-negative least-squares problem, which has one minimum: no starts are needed. Condition number
+  12.5; the variances are inflated 3.25 times for the colour of the residual.
+# m1, the choice
+| -: parameter / value / ± standard error / unit / note [0, 3, 4]
+weight at 0 V / −4 / 0.02 / mrad/V /
+weight at 1 V / −3 / 0.02 / mrad/V /
+The weights are a non-negative least-squares problem, which has one minimum: no starts are needed. Condition number
+  25; the variances are inflated 6.5 times for the colour of the residual.
+# All models
+A reason.
+| -: residual in % of the peak-to-peak output, 250 µrad / fitted, rms / fitted, peak / unseen, rms / unseen, peak /
+  unseen, rms / admissible [0, 6] best [0] brief [0, 1, 2, 3, 4]
+m1 (chosen) / 1.375 / 3.50 / 1.500 / 5.50 / 3.75 µrad / yes
+straight line / 7.500 / 8.50 / 2.000 / 9.50 / 5 µrad /
+m0 / 1.500 / 4.50 / 2.500 / 6.50 / 6.25 µrad / yes
+""")
+
+
+PICTURES = ("excitation", "loops", "residuals", "tests", "response", "poles")
+
+
+def test_a_linear_part_stands_with_its_orders_poles_and_gains():
+    scan = [
+        ns(
+            order=k,
+            parameters=2 * k + 1,
+            chi_square=100.0 / k,
+            freedom=40 * (k - 2),
+            criterion=1234.567 * k,
+            output_error_rms=1.25e-6 / k,
+        )
+        for k in (2, 3)
+    ]
+    linear = ns(**{**vars(rich_linear()), "scan": scan})
+    assert outline(identification_page._linear(a_found(linear=linear), {"poles": ns(name="poles")})) == one_text("""
+# Linear part
+# Order
+The knee of the criterion.
+| -: order / parameters / chi-square per degree of freedom / criterion / output error (rms) /  [5] brief [0, 1, 3,
+  5]
+2 / 5 / 50 / 2469.1 / 0.625 µrad /
+3 / 7 / 0.8333 / 3703.7 / 0.4167 µrad / chosen
+# Poles, zeros and gains
+[poles]
+| -:  / natural frequency / ± / damping ratio / ± / excited /  [0, 5, 6] brief [0, 1, 2, 3, 5]
+pole pair / 5 Hz / 0.25 Hz / 0.6 / 0.05 / yes /
+pole, real / 12 Hz / 0.5 Hz / 1 /  / yes /
+zero, real / 40 Hz / 1.5 Hz / −1 /  / no / extrapolated
+gain at zero frequency / 5 mrad/V / 0.4 mrad/V /  /  / no / extrapolated
+gain at 2 Hz / 4.5 mrad/V / 0.2 mrad/V /  /  / yes /
+""")
+
+
+def test_the_origin_of_a_page_names_the_mirror_file_and_each_recording_with_its_digest(monkeypatch):
+    monkeypatch.setattr(identification_page, "versions", lambda: {"microrad": "1.2", "numpy": "3.4"})
+    view = identification_page._origin(a_found(), Path("lab.toml"), "text = 1\nmore = 2\n", "m0")
+    assert outline(view) == one_text("""
+# Mirror file and origin
+lab.toml holds m0:
+text = 1
+more = 2
+| -: recording / SHA-256 [0, 1]
+a/r0.csv / 0f
+b/r1.csv / 1f
+c/r2.csv / 2f
+Mirror file SHA-256 fc18b6646c484fbbe7f55bc4bf0f57289d4c6b25a1da10803edbbb15b2e55035. Every number above is computed
+  from these recordings. Standard errors come from the residuals of the fitted samples.
+Made with microrad 1.2, numpy 3.4.
+""")
+
+
+def test_a_page_without_warnings_refusals_findings_or_pictures_says_so(monkeypatch):
+    monkeypatch.setattr(identification_page.words, "warnings", lambda found, written: [])
+    found = a_found(refused=[])
+    for each in found.recordings:
+        each.findings = []
+    views = identification_page._views(found, "m1")
+    assert outline(views[0], views[4]) == one_text("""
+# Warnings and refusals
+- No warnings.
+# Time response
+""")
+    assert outline(views[1]).split("\n")[-1] == "The checks of the recordings noticed nothing."
+    assert [view.folded for view in views[6].views] == [True, False]
+    assert [view.title for view in views[6].views] == ["m0", "m1, the choice, in the mirror file"]
+
+
+@pytest.mark.parametrize(
+    ("drive", "volts", "rate_hz", "said"),
+    [
+        (3.0 + 2.0 * np.sin(2 * np.pi * np.arange(64) / 16.0), 1.0, 1600.0, "100 Hz, ± 2 V about 3 V"),
+        (3.0 + 2.0 * np.sin(2 * np.pi * np.arange(64) / 16.0), 10.0, 800.0, "50 Hz, ± 20 V about 30 V"),
+        (np.arange(32.0) ** 3 % 17, 0.001, 8.0, "many frequencies, ± 0.008 V about 0.008 V"),
+        (np.zeros(16), 1.0, 8.0, "many frequencies, ± 0 V about 0 V"),
+    ],
+)
+def test_a_drive_is_told_in_volts_whatever_unit_its_file_has(drive, volts, rate_hz, said):
+    assert words.drive_text(ns(drive=drive[:, None], rate_hz=rate_hz), volts) == said

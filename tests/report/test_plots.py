@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from numpy.testing import assert_allclose, assert_array_equal
 
 from budget_files import kept_study
@@ -39,10 +40,10 @@ from microrad.report.error_budget.figures import budget_figures
 from microrad.report.identification import figures as identification
 from microrad.report.paper.figures import margin_map
 from microrad.report.plotting import axes as renderer
-from microrad.report.plotting import interactive, svg
+from microrad.report.plotting import interactive, scales, svg
 from microrad.report.plotting.axes import axes_of
 from microrad.report.plotting.layout import layout
-from microrad.report.plotting.sheet import Area, Axis, Bars, Field, Legend, Line, Rule, Span, Words, empty, grid
+from microrad.report.plotting.sheet import Area, Axis, Bars, Field, Legend, Line, Rule, Sheet, Span, Words, empty, grid
 from places import ROOT
 from response_tables import TABLES
 from shared import once
@@ -846,3 +847,308 @@ def test_limits_are_widened_to_those_of_what_was_there_before(given, now, before
 def test_a_logarithmic_axis_takes_no_limit_that_is_not_positive():
     assert renderer._ends(Axis(log=True, low=0.0, high=7.0), (1.0, 2.0), None) == (1.0, 7.0)
     assert renderer._ends(Axis(log=True, low=-1.0), (1.0, 2.0), None) is None
+
+
+# ----------------------------------------------------------------------------------------------- artists, one by one
+def hue(colour):
+    return "none" if to_hex(colour, keep_alpha=True)[7:] == "00" else to_hex(colour)
+
+
+def artists(ax):
+    """What stands in axes, artist by artist, each in a line of words."""
+    found = [f"{ax.get_xlabel()}; {ax.get_ylabel()}; {ax.get_title()}; {hue(ax.get_facecolor())}"]
+    for line in ax.lines:
+        marker = (line.get_marker(), f"{line.get_markersize():g}", hue(line.get_markerfacecolor()))
+        marker += (hue(line.get_markeredgecolor()), f"{line.get_markeredgewidth():g}", line.get_markevery())
+        look = (line.get_linestyle(), f"{line.get_linewidth():g}", line.get_drawstyle(), line.get_clip_on())
+        found.append(" ".join(map(str, ("line", line.get_label(), hue(line.get_color()), *look, *marker))))
+    for one in ax.patches:
+        look = hue(one.get_facecolor()), hue(one.get_edgecolor()), f"{one.get_linewidth():g}", one.get_alpha()
+        found.append(" ".join(map(str, (type(one).__name__, one.get_label(), *look, one.get_hatch()))))
+    for text in ax.texts:
+        box = text.get_bbox_patch()
+        look = hue(text.get_color()), text.get_ha(), text.get_va(), box and (hue(box.get_facecolor()), box.get_alpha())
+        found.append(" ".join(map(str, (text.get_text(), text.xy, text.get_position(), text.xycoords, *look))))
+    return found
+
+
+def test_each_artist_has_the_look_of_its_mark():
+    sheet, (panel, other) = grid(6.0, 4.0, 1, 2)
+    x, ring = np.array([1.0, 3.0, 4.0]), np.array([[1.0, 1.0], [2.0, 1.0], [2.0, 3.0]])
+    arms, wide = np.array([[0.5, 0.25, 0.0], [1.0, 2.0, 0.75]]), np.array([0.4, 0.8])
+    bars = np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([2.5, 1.0]), wide
+    dashes = (3.0, 1.0)
+    panel.add(
+        Line(x, x - 2.0, "#d55e00", dashes, 1.7, "a", "", "D", 5.0, "", "#009e73", 0.6, (0, 2)),
+        Line(x, x * 2.0, "#56b4e9", "", label="b", marker=".", size=3.0, clip=False, x_arms=arms, y_arms=2.0 * arms),
+        Line(x, x, "#0072b2", ":", 0.9, name="c", steps=True, marker="s", face="#e69f00"),
+        Rule(2.5, True, "#777777", "-.", 0.7, "d"),
+        Rule(-1.5, False, "#cc79a7", "--", 1.4, "e"),
+        Span(0.5, 1.5, False, "#009e73", 0.35, "f"),
+        Span(2.0, math.inf, True, "#56b4e9", 0.2),
+        Area((ring,), "#e69f00", 0.6, "g", "#0072b2", 0.9),
+        Area((ring, ring[:2]), "#000000", label="h", hatched=True),
+        Area((ring[:2],), "#000000", label="of two points"),
+        Bars(*bars, "#777777", False, 0.8, "#000000", "i"),
+        Bars(*bars, "#56b4e9", True),
+        Words("one", 3.0, 0.25, "#d55e00", 7.0, "end", "top", (3.0, -4.0), "y", True),
+        Words("two", 0.5, 2.0, anchor="middle", base="bottom", of_panel="x"),
+    )
+    panel.x, panel.y = Axis("x (s)", low=0.0), Axis("y (m)", grid=False, ticks=(0.0, 2.0, 4.0))
+    panel.face, panel.title, panel.legend = "#eeeeee", "T", Legend("lower left", 2, "Key", "#ffffff")
+    other.add(Line(x, x, label="z"))
+    other.legend = Legend("right", 3)
+    first, second = axes_of(sheet)
+    assert artists(first) == [
+        "x (s); y (m); T; #eeeeee",
+        "line a #d55e00 -- 1.7 default True D 5 none #009e73 0.6 [0, 2]",
+        "line b #56b4e9 None 1.3 default False . 3 #56b4e9 #56b4e9 0 None",
+        *["line _nolegend_ #1f77b4 None 1.5 default True | 6 #1f77b4 #56b4e9 1 None"] * 2,
+        *["line _nolegend_ #1f77b4 None 1.5 default True _ 6 #1f77b4 #56b4e9 1 None"] * 2,
+        "line _child8 #0072b2 : 0.9 steps-post True s 6 #e69f00 #0072b2 1 None",
+        "line d #777777 -. 0.7 default True None 6 #777777 #777777 1 None",
+        "line e #cc79a7 -- 1.4 default True None 6 #cc79a7 #cc79a7 1 None",
+        "Rectangle f #009e73 none 1 0.35 None",
+        "Rectangle None #56b4e9 none 1 0.2 None",
+        "PathPatch g #e69f00 #0072b2 0.9 0.6 None",
+        "PathPatch h none #000000 0 None ////",
+        *["Rectangle _nolegend_ #777777 #000000 0.5 0.8 None"] * 2,
+        *["Rectangle _nolegend_ #56b4e9 none 0.5 1.0 None"] * 2,
+        "one (3.0, 0.25) (3.0, -4.0) ('data', 'axes fraction') #d55e00 right top ('#ffffff', 0.75)",
+        "two (0.5, 2.0) (0.0, 0.0) ('axes fraction', 'data') #000000 center bottom None",
+    ]
+    lying, upright = (each.patches for each in first.containers[1:])
+    assert_allclose([each.get_bbox().extents for each in lying], [[0.5, 0.8, 2.5, 1.2], [-1.0, 1.6, 1.0, 2.4]])
+    assert_allclose([each.get_bbox().extents for each in upright], [[0.8, 0.5, 1.2, 2.5], [1.6, -1.0, 2.4, 1.0]])
+    arms_across, arms_up = (each.get_segments() for each in first.collections)
+    assert_allclose(arms_across, [[[0.5, 2.0], [2.0, 2.0]], [[2.75, 6.0], [5.0, 6.0]], [[4.0, 8.0], [4.75, 8.0]]])
+    assert_allclose(arms_up, [[[1.0, 1.0], [1.0, 4.0]], [[3.0, 5.5], [3.0, 10.0]], [[4.0, 8.0], [4.0, 9.5]]])
+    legend = first.get_legend()
+    assert "".join(text.get_text() for text in legend.get_texts()) == "abdefghi"
+    assert [legend.get_title().get_text(), legend._ncols, legend._loc] == ["Key", 2, 3]
+    assert [hue(legend.get_frame().get_facecolor()), legend.get_frame().get_alpha()] == ["#32436d", 1.0]
+    assert {hue(text.get_color()) for text in legend.get_texts()} == {"#ffffff"}
+    assert [each.get_markersize() for each in legend.legend_handles if hasattr(each, "get_markersize")] == [5, 7, 6, 6]
+    assert [first.xaxis.get_gridlines()[0].get_visible(), first.yaxis.get_gridlines()[0].get_visible()] == [True, False]
+    assert (first.get_xlim()[0], first.get_yticks().tolist(), first.get_axisbelow()) == (0.0, [0.0, 2.0, 4.0], True)
+    plain = second.get_legend()
+    assert [plain._loc, plain._ncols, hue(plain.get_frame().get_facecolor())] == [0, 1, "#ffffff"]
+    assert artists(second)[1:] == ["line z #000000 - 1.3 default True None 6 #000000 #000000 1 None"]
+
+
+def grown(freq, scale=1.0):
+    """Two outputs and an input, unlike in gain and in phase at each frequency."""
+    return scale * (1.0 + np.atleast_1d(freq))[:, None, None] * np.array([[[2.0], [-3.0j]]])
+
+
+def test_a_fit_of_two_outputs_has_its_table_its_model_and_their_bands_panel_by_panel(monkeypatch):
+    monkeypatch.setattr(plots, "_FINE", 2)
+    freq = np.array([0.0, 2.0, 8.0])
+    fit = SimpleNamespace(
+        freq_hz=freq,
+        residual=grown(freq, 0.5),
+        response=grown,
+        response_errors=lambda at: (np.abs(grown(at, 0.1)), np.abs(grown(at, 0.05))),
+        order=3,
+    )
+    assert lines_of(plots._fit_bode(fit)) == [
+        "Sheet width=6.4 height=9.2 heights=[1.4 1 1.4 1] share_x=True",
+        "Panel 0 0 x=<log=True> y=<title=gain (output/input) log=True low=3> title=output 1 from input 1",
+        "  legend=<>",
+        "Line x=[2 8] y=[9 27] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        "Area rings=[[[2 4.824] [8 14.472] [8 21.528] [2 7.176]]] colour=#D55E00 opacity=0.3 label=95 %",
+        "  confidence of the model",
+        "Line x=[2 8] y=[6 18] colour=#D55E00 dash=-- width=1.4 label=model, order 3",
+        "Panel 1 0 x=<title=frequency (Hz) log=True> y=<title=phase (°) low=-20 high=20>",
+        "Line x=[2 8] y=[0 0] colour=#0072B2 dash= marker=. size=4.5",
+        "Area rings=[[[2 -33.6899] [8 -101.07] [8 101.07] [2 33.6899]]] colour=#D55E00 opacity=0.3",
+        "Line x=[2 8] y=[0 0] colour=#D55E00 dash=-- width=1.4",
+        "Panel 2 0 x=<log=True> y=<title=gain (output/input) log=True low=4.5> title=output 2 from input",
+        "  1",
+        "Line x=[2 8] y=[13.5 40.5] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        "Area rings=[[[2 7.236] [8 21.708] [8 32.292] [2 10.764]]] colour=#D55E00 opacity=0.3 label=95 %",
+        "  confidence of the model",
+        "Line x=[2 8] y=[9 27] colour=#D55E00 dash=-- width=1.4 label=model, order 3",
+        "Panel 3 0 x=<title=frequency (Hz) log=True> y=<title=phase (°) low=-110 high=-70>",
+        "Line x=[2 8] y=[-90 -90] colour=#0072B2 dash= marker=. size=4.5",
+        "Area rings=[[[2 -140.535] [8 -241.605] [8 61.6046] [2 -39.4651]]] colour=#D55E00 opacity=0.3",
+        "Line x=[2 8] y=[-90 -90] colour=#D55E00 dash=-- width=1.4",
+    ]
+
+
+def test_the_linear_part_of_an_identification_is_drawn_in_microradians_a_volt():
+    freq = np.array([2.0, 8.0])
+    part = {"freq_hz": freq, "response": grown(freq, 1e-6), "standard_error": np.abs(grown(freq, 1e-7))}
+    linear = SimpleNamespace(response=SimpleNamespace(**part), residual=grown(freq, 1e-7), order=5)
+    assert lines_of(plots._identified_bode(SimpleNamespace(linear=linear))) == [
+        "Sheet width=6.4 height=4.6 heights=[1.4 1] share_x=True",
+        "Panel 0 0 x=<log=True> y=<title=gain (µrad/V) log=True> legend=<>",
+        "Area rings=[[[2 5.16844] [8 15.5053] [8 20.4947] [2 6.83156]]] colour=#56B4E9 opacity=0.6",
+        "  label=95 % confidence",
+        "Line x=[2 8] y=[6 18] colour=#0072B2 dash= label=measured marker=. size=4.5",
+        "Line x=[2 8] y=[5.4 16.2] colour=#D55E00 dash=-- width=1.4 label=linear model, order 5",
+        "Panel 1 0 x=<title=frequency (Hz) log=True> y=<title=phase (°) low=-20 high=20>",
+        "Area rings=[[[2 -7.96643] [8 -7.96643] [8 7.96643] [2 7.96643]]] colour=#56B4E9 opacity=0.6",
+        "Line x=[2 8] y=[0 0] colour=#0072B2 dash= marker=. size=4.5",
+        "Line x=[2 8] y=[0 0] colour=#D55E00 dash=-- width=1.4",
+    ]
+
+
+def test_a_fifth_axis_looks_like_the_first_and_a_whole_run_has_no_steady_part():
+    error = 1e-6 * np.outer([1.0, -2.0, 2.0], [1.0, 10.0, -0.04, 200.0, 3.0])
+    (panel,) = plots._errors(np.array([0.0, 1.0, 2.0]), error).panels
+    assert [(line.label, line.colour, line.dash) for line in panel.marks] == [
+        ("axis 1: rms 1.73 µrad", "#0072B2", "-"),
+        ("axis 2: rms 17.3 µrad", "#D55E00", "--"),
+        ("axis 3: rms 0.069 µrad", "#009E73", "-."),
+        ("axis 4: rms 346 µrad", "#E69F00", ":"),
+        ("axis 5: rms 5.20 µrad", "#0072B2", "-"),
+    ]
+
+
+def test_a_spectrum_of_five_axes_goes_on_with_the_look_of_the_first():
+    density = 1e-12 * np.outer(np.ones(6), np.arange(1.0, 6.0) ** 2)
+    sheet = plots._left_spectrum(SimpleNamespace(freq_hz=np.arange(6.0), psd_rad2_hz=density))
+    looks = [("#0072B2", "-"), ("#D55E00", "--"), ("#009E73", "-."), ("#E69F00", ":"), ("#0072B2", "-")]
+    assert [[(line.colour, line.dash) for line in panel.marks] for panel in sheet.panels] == [looks] * 2
+    assert [line.name for line in sheet.panels[1].marks] == [f"axis {k}" for k in range(1, 6)]
+    assert [float(line.y[-1]) for line in sheet.panels[0].marks] == pytest.approx([1.0, 4.0, 9.0, 16.0, 25.0])
+
+
+def test_loops_beyond_seven_begin_with_the_first_colour_again():
+    drive = np.array([-1.0, 0.0, 1.0])
+    loops = [SimpleNamespace(drive_v=drive, output_rad=1e-3 * (k + drive), freq_hz=10.0**k) for k in range(9)]
+    left, right = plots._loops(loops).panels
+    looks = "#000000- #0072B2-- #009E73-. #D55E00: #E69F00- #56B4E9-- #000000-. #0072B2: #009E73-"
+    assert " ".join(f"{line.colour}{line.dash}" for line in left.marks) == looks
+    assert " ".join(f"{line.colour}{line.dash}" for line in right.marks) == looks
+    named = [line.name for line in right.marks]
+    assert [line.label for line in left.marks] == named and named[:3] == ["1 Hz", "10 Hz", "100 Hz"]
+
+
+def test_a_disturbance_is_drawn_about_its_corner_and_its_lines_which_stand_in_its_rms():
+    """One pole of 10 rad/s: S = 2 b² / (w² + a²) on one side, b² / (2 a) in all."""
+    lines = SpectralLine(2e-6, 40.0), SpectralLine(1e-6, 7.0)
+    filtered = np.array([[-10.0]]), np.array([[2e-6]]), np.array([[1.0]])
+    sheet = plots._disturbance_spectrum(Disturbance("wheels", *filtered, lines, "assumed", "a test"))
+    (density, *rules), (below,) = (panel.marks for panel in sheet.panels)
+    assert [(rule.at, rule.upright, rule.colour, rule.dash, rule.label) for rule in rules] == [
+        (at, True, "#D55E00", ":", "spectral lines") for at in (40.0, 7.0)
+    ]
+    assert (density.label, density.name, below.label, below.name) == ("wheels", "", "", "wheels")
+    assert {density.colour, below.colour} == {"#0072B2"} and density.dash == below.dash == "-"
+    assert density.x[[0, -1]] == pytest.approx([10.0 / (2.0 * np.pi) / 30.0, 1200.0]) and density.x.size == 2000
+    assert density.y == pytest.approx(2e12 * 4e-12 / ((2.0 * np.pi * density.x) ** 2 + 100.0))
+    assert below.y[-1] == pytest.approx(math.sqrt(4.0 / 20.0 + 4.0 / 2.0 + 1.0 / 2.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "room", "lines"),
+    [
+        ("short", 1000.0, ["short"]),
+        ("a long title of axes (µrad)", 60.0, ["a long title", "of axes (µrad)"]),
+        ("one line here\nanother longer line there", 50.0, ["one line here", "another longer", "line there"]),
+        ("unbreakablelongword here", 10.0, ["unbreakablelongword", "here"]),
+    ],
+)
+def test_a_title_is_broken_between_words_and_at_no_less_than_twelve_letters(text, room, lines):
+    assert renderer._broken(text, room, 9.0).split("\n") == lines
+
+
+def test_a_title_that_just_fits_is_left_as_it_is():
+    wide = scales.width_of("two words", 9.0)
+    assert renderer._broken("two words", wide, 9.0) == "two words"
+
+
+@pytest.mark.parametrize(("dash", "style"), [("-", "-"), ("", "None"), ("-.", "-."), ((1.0, 2.0), (0.0, (1.0, 2.0)))])
+def test_a_dash_is_one_of_matplotlibs_or_lengths_from_their_begin(dash, style):
+    assert renderer._style(dash) == style
+
+
+@pytest.mark.parametrize(
+    ("before", "found"),
+    [(None, ((0.5, 8.0), (1.0, 4.0))), ((2.0, 9.0), ((0.5, 9.0), (1.0, 9.0))), ((0.1, 3.0), ((0.1, 8.0), (0.1, 4.0)))],
+)
+def test_limits_of_the_sheet_are_widened_in_each_direction_where_axes_hold_other_data(before, found):
+    sheet, (panel,) = grid(4.0, 3.0)
+    panel.add(Line(np.array([1.0, 4.0]), np.array([1.5, 2.5])))
+    panel.x, panel.y = Axis("x", low=0.5, high=8.0), Axis("y", low=1.0, high=4.0)
+    _, ax = pyplot.subplots()
+    if before:
+        ax.plot([1.0, 2.0], [1.0, 2.0])
+        ax.set(xlim=before, ylim=before)
+    assert axes_of(sheet, ax) is ax
+    assert (ax.get_xlim(), ax.get_ylim()) == found
+
+
+def test_a_heading_and_the_legend_of_a_sheet_above_and_below_stand_on_the_figure():
+    for place, at in (("below", "lower center"), ("above", "upper center"), ("lower right", "upper center")):
+        sheet, panels = grid(5.0, 4.0, 2, 1, share_x=True, share_y=True)
+        sheet.heading, sheet.heading_colour, sheet.legend = "A $heading", "#0072b2", Legend(place, 2)
+        for k, panel in enumerate(panels):
+            panel.add(Line(np.arange(3.0), np.arange(3.0) + k, label=f"l{k}"), Rule(1.0, True, label="both"))
+        first, second = axes_of(sheet)
+        (legend,) = first.figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == ["l0", "both", "l1"]
+        assert (legend._loc, legend._ncols, bool(legend._outside_loc)) == (9 if at == "upper center" else 8, 2, True)
+        assert first.figure.get_suptitle() == "A $heading" and hue(first.figure._suptitle.get_color()) == "#0072b2"
+        assert first.get_shared_x_axes().joined(first, second) and first.get_shared_y_axes().joined(first, second)
+        assert tuple(first.figure.get_size_inches()) == (5.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ([3], "axes: a int was given; give one matplotlib.axes.Axes for each panel"),
+        ("one", "axes: 1 given, and there are 3 panels to draw (y over x (m), right (s), named); give as many, or non"),
+    ],
+)
+def test_axes_that_do_not_fit_are_told_with_the_names_of_the_panels(axes, words):
+    sheet, (first, second, third) = grid(5.0, 4.0, 1, 3)
+    first.x.title, first.y.title, second.y.title, third.title = "x (m)", "y", "right (s)", "named"
+    with pytest.raises((TypeError, ValueError), match=re.escape(words)):
+        axes_of(sheet, [pyplot.figure().add_subplot()] if axes == "one" else axes)
+
+
+def test_a_sheet_of_unlike_shares_has_its_panels_over_the_columns_that_they_take():
+    sheet = Sheet(6.0, 4.0, (1.0, 3.0), (2.0, 1.0, 1.0))
+    sheet.panel(0, 1, 2), sheet.panel(1, 0)
+    wide, low = (ax.get_subplotspec() for ax in axes_of(sheet))
+    assert [wide.rowspan, wide.colspan, low.rowspan, low.colspan] == [range(1), range(1, 3), range(1, 2), range(1)]
+    of = wide.get_gridspec()
+    assert (list(of.get_height_ratios()), list(of.get_width_ratios())) == ([1.0, 3.0], [2.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("plot", "given", "words"),
+    [
+        ("bode", [1], "plot_bode: cannot plot what is of type list; give one of these: FrequencyResponseFit, Freq"),
+        ("loops", "ab", "type str; give one of these: HysteresisLoop, Identification, a sequence of HysteresisLoop"),
+        ("loops", (), "plot_loops: the sequence is empty; give one HysteresisLoop or more"),
+        ("loops", [None, 3], "plot_loops: cannot plot what is of type NoneType; give one of these: Hyst"),
+        ("residual", None, "these: Identification, FrequencyResponseFit, Trace, PointingTrace, Run"),
+        ("spectrum", 3.0, "plot_spectrum: cannot plot what is of type float; give one of these: Ensemble, Disturbance"),
+        ("pointing_errors", {}, "type dict; give one of these: PointingErrorBudget, Study"),
+        ("contributions", {}, "plot_contributions: cannot plot what is of type dict; give one of these: PointingError"),
+        ("margin_map", 1j, "margin_map: cannot plot what is of type complex; give one of these: Study, LinkStudy"),
+        ("contacts", [], "plot_contacts: the sequence is empty; give one Contact or more"),
+        ("contacts", {3}, "plot_contacts: cannot plot what is of type set; give one of these: DayStudy, a sequence"),
+    ],
+)
+def test_each_plot_says_what_it_takes(plot, given, words):
+    with pytest.raises((TypeError, ValueError), match=re.escape(words)):
+        getattr(plots, f"plot_{plot}")(given)
+
+
+def test_responses_of_two_inputs_stand_beside_each_other_under_their_names():
+    value = np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]) * np.array([1.0, 10.0])[:, None, None]
+    names = {"output_names": ("tip", "tilt", "heave"), "input_names": ("left", "right")}
+    response = {"freq_hz": np.array([1.0, 2.0]), "response": value.astype(complex), "standard_error": 0.0 * value}
+    sheet = plots._measured_bode(SimpleNamespace(**response, **names))
+    assert (sheet.width, sheet.height, sheet.widths) == (6.8, pytest.approx(13.8), (1.0, 1.0))
+    size = [panel for panel in sheet.panels if panel.row % 2 == 0]
+    assert [(panel.row, panel.column, panel.title, float(panel.all_of(Line)[0].y[1])) for panel in size] == [
+        *((0, 0, "tip from left", 10.0), (0, 1, "tip from right", 20.0), (2, 0, "tilt from left", 30.0)),
+        *((2, 1, "tilt from right", 40.0), (4, 0, "heave from left", 50.0), (4, 1, "heave from right", 60.0)),
+    ]
+    assert [panel.legend is not None for panel in sheet.panels] == [True] + [False] * 11

@@ -15,10 +15,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from drawn import figure_of, one_text, outline
 from microrad import report
 from microrad.core import folder, machine
+from microrad.link.budget.lines import FREE_SPACE_LOSS
 from microrad.link.requirement import Requirement
 from microrad.mission import file as missionfile
+from microrad.report.data import finite
+from microrad.report.page import templates as scripts
 from microrad.report.page.templates import inputs_view
 from microrad.report.paper import bench
 from microrad.report.paper import diagrams as drawings
@@ -1142,3 +1146,278 @@ def test_what_is_counted_has_its_number(monkeypatch, count, s):
     of.day.relay.contacts = range(count)
     assert chain._orbit(of).lines[0] == f"{count} contact{s} in 36 h"
     assert chain._mirror(of)[1] == f"{count} actuator{s}, {count} output{s}"
+
+
+# -------------------------------------------------------------------------------- the paper's parts of made-up numbers
+def test_the_chirp_of_the_bench_is_drawn_whole_and_close_up_with_its_response():
+    time = np.arange(5.0) / 4.0
+    close = slice(3, 1503)
+    found = bench.Chirp(
+        time, 2.0 * time, 1e-6 * time, 1.5e-6 * time, 96.54, np.array([2.0, 50.0, 333.3]),
+        1e-6 * np.array([4.0, -3.0j, -2.0]),
+        1e-6 * np.array([5.0, 3.5j, 1.0]),
+    )  # fmt: skip
+    assert bench.close_up(found) == close
+    lines = figure_of(bench.chirp_figure(found))
+    assert lines[:2] == ["fig4-chirp", "Fig. 4  Identified linear dynamics (virtual bench)"]
+    assert "a chirp of 2 Hz to 333.3 Hz played into Eq. 2" in lines[2] and "5 poles" in lines[2]
+    assert "explains 96.5 % of it (the paper: about 97 %)" in lines[2]
+    assert lines[3] == {
+        "time, close up (s)": [0.75, 1.0],
+        "drive about its mean (V)": [1.5, 2.0],
+        "measured about its mean (rad)": [7.5e-7, 1e-6],
+        "modelled about its mean (rad)": [1.125e-6, 1.5e-6],
+        "frequency (Hz)": [2.0, 50.0, 333.3],
+        "gain, measured (rad/V)": [4e-6, 3e-6, 2e-6],
+        "phase, measured (rad)": [0.0, -1.5708, -3.14159],
+        "gain, model (rad/V)": [5e-6, 3.5e-6, 1e-6],
+        "phase, model (rad)": [0.0, 1.5708, 0.0],
+    }
+    assert "\n".join(lines[4:]) == one_text("""
+Sheet width=7.6 height=5.4 heights=[1 1] widths=[1 1] legend=<place=above columns=2>
+Panel 0 0 x=<title=time (s)> y=<title=output about its mean (µrad)>
+Line x=[0 0.25 0.5 0.75 1] y=[0 0.25 0.5 0.75 1] colour=#D55E00 width=1.1 label=measured
+  (virtual bench)
+Line x=[0 0.25 0.5 0.75 1] y=[0 0.375 0.75 1.125 1.5] colour=#0072B2 dash=-- width=1.1
+  label=model
+Panel 0 1 x=<title=time (s)> y=<title=output about its mean (µrad)>
+Line x=[0.75 1] y=[0.75 1] colour=#D55E00 width=1.1 label=measured (virtual bench)
+Line x=[0.75 1] y=[1.125 1.5] colour=#0072B2 dash=-- width=1.1 label=model
+Panel 1 0 x=<title=frequency (Hz) log=True high=333.3> y=<title=gain (µrad/V) low=0>
+Line x=[2 50 333.3] y=[4 3 2] colour=#D55E00 dash= marker=. size=3
+Line x=[2 50 333.3] y=[5 3.5 1] colour=#0072B2 dash=-- size=3
+Panel 1 1 x=<title=frequency (Hz) log=True high=333.3> y=<title=phase (°)>
+Line x=[2 50 333.3] y=[0 -90 -180] colour=#D55E00 dash= marker=. size=3
+Line x=[2 50 333.3] y=[0 90 0] colour=#0072B2 dash=-- size=3
+""")
+
+
+def test_loops_of_the_bench_say_which_was_fitted_and_which_are_predicted():
+    drive = np.array([0.0, 1.0, 2.0])
+    loops = tuple(
+        bench.Loop(f, 60.0, drive + f, 1e-3 * drive * f, 1.1e-3 * drive * f, 0.125 * f) for f in (1.0, 25.0, 60.0)
+    )
+    lines = figure_of(bench.loops_figure(loops))
+    assert "Eq. 3 is fitted to the 60 Hz record alone and predicts the others" in lines[2]
+    assert list(lines[3]) == [f"{what} at {f} Hz ({unit})" for f in (1, 25, 60) for what, unit in LOOP_COLUMNS]
+    assert "\n".join(lines[4:]) == one_text("""
+Sheet width=7.6 height=3.2 widths=[1 1 1] share_y=True
+Panel 0 0 x=<title=drive (V) most=4> y=<title=output (mrad)> title=1 Hz, predicted: 0.12 % rms
+  title_size=8.5 legend=<place=upper left>
+Line x=[1 2 3] y=[0 1 2] colour=#0072B2 dash= label=measured (virtual bench) marker=o size=4.5
+  face=
+Line x=[1 2 3] y=[0 1.1 2.2] width=0.9 label=model
+Panel 0 1 x=<title=drive (V) most=4> title=25 Hz, predicted: 3.12 % rms title_size=8.5
+Line x=[25 26 27] y=[0 25 50] colour=#009E73 dash= label=measured (virtual bench) marker=o
+  size=4.5 face=
+Line x=[25 26 27] y=[0 27.5 55] width=0.9 label=model
+Panel 0 2 x=<title=drive (V) most=4> title=60 Hz, fitted: 7.50 % rms title_size=8.5
+Line x=[60 61 62] y=[0 60 120] colour=#D55E00 dash= label=measured (virtual bench) marker=o
+  size=4.5 face=
+Line x=[60 61 62] y=[0 66 132] width=0.9 label=model
+""")
+    x, y = bench._points(np.arange(125.0), 1e-3 * np.arange(125.0))
+    assert (list(x), list(y)) == (list(range(0, 125, 2)), pytest.approx(list(range(0, 125, 2))))
+
+
+LOOP_COLUMNS = (("drive", "V"), ("measured", "rad"), ("model", "rad"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "pid", "plant"),
+    [
+        (
+            {},
+            ["Kp 2 V/mrad", "Ki 300 V/(mrad s)", "Kd 0.04 V s/mrad"],
+            ["amplifier, 2 kHz", "hysteresis, Eq. 3", "linear part, Eq. 2"],
+        ),
+        (
+            {"derivative_v_s_rad": 0.0},
+            ["Kp 2 V/mrad", "Ki 300 V/(mrad s)"],
+            ["amplifier, 2 kHz", "hysteresis, Eq. 3", "linear part, Eq. 2"],
+        ),
+        (
+            {"linear": None},
+            ["Kp 2 V/mrad", "Ki 300 V/(mrad s)", "Kd 0.04 V s/mrad"],
+            ["amplifier, 2 kHz", "hysteresis, Eq. 3"],
+        ),
+        (
+            {"bouc_wen": None},
+            ["Kp 2 V/mrad", "Ki 300 V/(mrad s)", "Kd 0.04 V s/mrad"],
+            ["amplifier, 2 kHz", "hysteresis", "linear part, Eq. 2"],
+        ),
+    ],
+)
+def test_the_diagram_of_the_control_has_the_gains_and_parts_that_there_are(changes, pid, plant):
+    c = {
+        "proportional_v_rad": 2e3,
+        "integral_v_rad_s": 3e5,
+        "derivative_v_s_rad": 40.0,
+        "rate_hz": 2e4,
+        "delay_s": 5e-5,
+    }
+    mirror = {"linear": 1, "bouc_wen": 2} | {k: v for k, v in changes.items() if k in ("linear", "bouc_wen")}
+    control = ns(**c | {k: v for k, v in changes.items() if k in c}, sensor_resolution_rad=1.25e-7)
+    mission = ns(control=control, mirror=ns(**mirror), amplifier=ns(bandwidth_hz=2e3))
+    found = drawings.control(ns(file=ns(mission=mission)))
+    assert found["pid"] == ("PID", *pid, "20 kHz, 50 µs late")
+    assert found["plant"] == ("Mirror", *plant)
+    assert found["sensor"] == ("Strain gauge", "0.125 µrad steps")
+    assert (
+        f"PID ({', '.join(pid)}, at 20 kHz, 50 µs late)" in found["words"]
+        and f"({', '.join(plant)}), whose" in found["words"]
+    )
+
+
+@pytest.mark.parametrize("ahead", [None, 1])
+def test_the_drawing_of_the_relay_has_a_bar_for_each_error_to_the_scale_of_the_largest(ahead):
+    lines = [ns(name=f"e{k}", value=1e-5 * (k + 1)) for k in range(5)]
+    mission = ns(
+        range_m=lambda of: 4.2e7, communication=ns(data_rate_bit_s=622.08e6), beacon=ns(divergence_rad=7e-4),
+        answer=ns(divergence_rad=2e-5), point_ahead=ahead,
+    )  # fmt: skip
+    found = drawings.relay(
+        ns(file=ns(mission=mission), open_loop=ns(lines=lines, rss_rad=8e-5, beacon_half_angle_rad=1e-4))
+    )
+    assert [(each["text"], round(each["width"], 6), each["colour"]) for each in found["errors"]] == [
+        ("e0 10 µrad", 20.0, "#E69F00"), ("e1 20 µrad", 40.0, "#56B4E9"), ("e2 30 µrad", 60.0, "#009E73"),
+        ("e3 40 µrad", 80.0, "#CC79A7"), ("e4 50 µrad", 100.0, "#E69F00"),
+        ("root sum square 80 µrad", 160.0, "#1b1f24"),
+        ("cone of the beacon 100 µrad", 200.0, "#0072B2"),
+    ]  # fmt: skip
+    steps = [
+        "wide beacon, 700 µrad",
+        "answer, 20 µrad",
+        f"narrow beam back{', point-ahead' * bool(ahead)}",
+        "lock; 622.1 Mbit/s",
+    ]
+    assert (found["height"], found["range"], found["sequence"]) == (420.0, "42000 km", steps)
+    assert f"Sequence: {'; '.join(steps)}. Open-loop pointing errors: e0 10 µrad, e1 20 µrad" in found["words"]
+
+
+# ------------------------------------------------------------------------------------------- words of made-up numbers
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [
+        (math.nan, ""), (-51.4e6, " or 51 Mbit/s"), (-1e6, " or 1 Mbit/s"), (-999e3, " or 999 kbit/s"),
+        (-1500.0, " or 1.5 kbit/s"), (-622.08e6, " or 622 Mbit/s"),
+    ],
+)  # fmt: skip
+def test_a_rate_that_goes_with_a_cost_is_in_megabits_from_one_on(rate, said):
+    assert words._rate_lost(ns(data_rate_bit_s=rate)) == said
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([("a", -1.5, "dB"), ("b", -2.25, "dB"), ("c", -9.0, "dBW")], "b 2.25 dB"),
+        ([(FREE_SPACE_LOSS, -290.0, "dB"), ("b", -2.25, "dB"), ("c", 7.0, "dB")], "b 2.25 dB"),
+        ([("a", -2.0, "dB"), ("b", -2.0, "dB")], "a 2.00 dB"),
+    ],
+)
+def test_the_largest_loss_that_a_design_can_change_is_in_decibels_and_not_that_of_space(lines, said):
+    budget = ns(lines=[ns(name=name, value=value, unit=unit) for name, value, unit in lines])
+    assert requirement_views.largest_loss(budget) == said
+
+
+@pytest.mark.parametrize(
+    ("swings", "said"),
+    [
+        ([], ""),
+        ([a_swing("a.b", "W", math.inf)], ""),
+        (
+            [a_swing("a.b", "W", math.inf), a_swing("c.d", "m", 1.5), a_swing("e", "W", 9.0)],
+            "; the margin moves most with c.d: 1.50 dB for ±10 %",
+        ),
+        ([a_swing("c.loss", "dB", 0.5)], "; the margin moves most with c.loss: 0.50 dB for ±0.5 dB"),
+        ([a_swing("c.gain", "dBW", 0.5)], "; the margin moves most with c.gain: 0.50 dB for ±0.5 dB"),
+        ([a_swing("r.outage", "", 0.25)], "; the margin moves most with r.outage: 0.25 dB for ten times more or less"),
+        (
+            [a_swing("a.bit_error_ratio", "", 0.25)],
+            ("; the margin moves most with a.bit_error_ratio: 0.25 dB for ten times more or less"),
+        ),
+    ],
+)
+def test_the_input_that_moves_a_margin_most_is_the_first_with_a_number_in_its_own_step(swings, said):
+    assert requirement_views.most_sensitive(swings) == said
+
+
+@pytest.mark.parametrize(
+    ("gain", "phase", "delay", "crossover", "shown"),
+    [
+        (2.0, 0.75, 1.25e-4, 123.4, ["6.0 dB", "43°", "125 µs", "0.312", "123 Hz"]),
+        (math.inf, 1.5, 2e-3, math.nan, ["none needed", "86°", "2 ms", "0.312", "none"]),
+        (1.5, 0.5, 1e-6, 98765.0, ["3.5 dB", "29°", "1 µs", "0.312", "98.8 kHz"]),
+    ],
+)
+def test_the_margins_of_the_papers_loop_are_told_in_the_units_of_a_designer(gain, phase, delay, crossover, shown):
+    of = ns(gain_up=gain, phase_rad=phase, delay_s=delay, modulus=0.31249, crossover_hz=crossover)
+    found = page._margins(ns(margins=of))
+    assert [text for _, text in found] == shown
+    assert [name for name, _ in found] == [
+        "gain margin",
+        "phase margin",
+        "delay margin",
+        "modulus margin, min |1 + L|",
+        "crossover",
+    ]
+
+
+def test_what_is_not_in_a_study_depends_on_its_loop_its_day_and_its_sky():
+    def said(fine=None, day=None):
+        return page._not_in_study(ns(fine_pointing=fine, day=day)).blocks[0]
+
+    mode = "the pointing loss that a receiver into a single mode has on its own side."
+    sines = " The residual is that of one axis tracking clean sines."
+    times = "light time in the times of contacts, drag, weather over"
+    assert said() == f"Vibration, sensor noise and turbulence; contact times; {mode}{sines}"
+    assert said(fine=1) == f"Turbulence; contact times; {mode}"
+    assert said(day=ns(sky=None)) == f"Vibration, sensor noise and turbulence; {times} the stations; {mode}{sines}"
+    assert said(fine=1, day=ns(sky=1)) == f"Turbulence; {times} radio stations; {mode}"
+
+
+def test_the_origin_of_a_report_has_each_file_with_its_digest_and_what_made_it(monkeypatch):
+    monkeypatch.setattr(page, "versions", lambda: {"microrad": "1.2", "numpy": "3.4"})
+    manifest = {
+        "mission": {"file": "m.toml", "sha256": "aa"}, "mirror": {"file": "lab.toml", "sha256": "bb"},
+        "inputs_sha256": {"x.csv": "cc", "y.csv": "dd"}, "machine": {"cpu": "one", "blas": "two"},
+        "randomness": "seeds",
+        "files_sha256": {"f.csv": 1, "f.svg": 2, "g.csv": 3},
+    }  # fmt: skip
+    assert outline(page._origin(manifest)) == one_text("""
+# Manifest
+This page holds what made it, as JSON: the mission's text, the files that it names, versions, seeds, the numbers of
+  the summary and a hash of each figure's file. microrad reproduce report.html runs it again and says whether the
+  numbers agree.
+| -: what / value [0, 1]
+mission file / m.toml, SHA-256 aa
+mirror file / lab.toml, SHA-256 bb
+named file / x.csv, SHA-256 cc
+named file / y.csv, SHA-256 dd
+random numbers / seeds
+machine / cpu: one; blas: two
+figures, as data and drawn / 3 files with their hashes
+Made with microrad 1.2, numpy 3.4. Hashes of every file, this page's too, are in manifest.json.
+""")
+    assert len(page._origin({**manifest, "mirror": None, "inputs_sha256": {}}).blocks[1].rows) == 4
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        (math.nan, None), (-math.inf, None), (np.float64(1.5), 1.5), (np.float32(np.inf), None), (np.int64(3), 3),
+        (np.bool_(True), True), ("nan", "nan"), (None, None), (0.0, 0.0), ((1.0, math.inf), [1.0, None]),
+        ({"a": [np.nan, {"b": (2,)}], 3: "c"}, {"a": [None, {"b": [2]}], 3: "c"}),
+    ],
+)  # fmt: skip
+def test_plain_data_have_python_numbers_and_none_for_what_is_not_finite(data, found):
+    plain = finite(data)
+    assert plain == found and type(plain) is type(found)
+
+
+@pytest.mark.parametrize("inside", ["", scripts.MARK, "</body> <p>"])
+def test_a_page_has_its_scripts_before_its_last_end_and_the_drawing_library_where_it_draws(inside):
+    made = scripts.with_scripts(f"<body>{inside}</body></html>")
+    library = scripts.library() if inside == scripts.MARK else ""
+    assert made == f"<body>{inside}{scripts.keyboard()}{library}</body></html>"
+    assert scripts.keyboard().count("<script>") == 1 and scripts.library().count("<script>") == 2

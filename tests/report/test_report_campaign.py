@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from drawn import figure_of, plain
+from drawn import figure_of, one_text, outline, plain
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.records import (
     CampaignSummary,
@@ -45,6 +45,7 @@ from microrad.report.campaign.tables import failed_table
 from microrad.report.campaign.text import campaign_text
 from microrad.report.plotting.palette import BLACK, WHITE
 from microrad.report.plotting.sheet import Axis, Field, Line, Panel, Rule, Span
+from microrad.report.view import Points
 from report_pages import assert_sound, without_scripts
 
 NAME = 'LEO <b>"A&B"</b> $x$'
@@ -2402,4 +2403,400 @@ def test_fresh_rows_agree_where_each_limit_is_kept_and_its_interval_too():
         "Fresh rows keep residual_quantile ≤ 9 urad in 95 % (90 to 97.5 %), which is less "
         "often than the 90 % wanted; for slack draw more rows (optimise.rows) or ask for a "
         "larger share (optimise.confidence)."
+    )
+
+
+# ------------------------------------------------------------------------------------------ what stands where, whole
+def test_a_page_of_two_combinations_has_every_part_with_its_tables_and_pictures_in_their_order():
+    summary = two_cells(limits=TWO_SIDES[1:], failed=((1, Failed(2, 99, 3, "a reason")),))
+    views = campaign_module.campaign_views(summary, campaign_figures(summary))
+    assert outline(*views) == one_text("""
+# Over the grid
+[campaign-grid]
+# Every combination (folded)
+| -: mirror / aperture / keep all / rows / failed [0, 1]
+b.toml / 6 cm / 25 % (6.25 % to 62.5 %) / 24 / 0
+a.toml / 5 cm / 75 % (68.8 % to 87.5 %) / 20 / 1
+| -: mirror / aperture / mean margin / miss margin [0, 1]
+b.toml / 6 cm / 8.00 dB / 15 %
+a.toml / 5 cm / 4.00 dB / 5 %
+Below in detail: mirror = a.toml, aperture = 5 cm, the first of those that miss a limit least.
+# Limits
+| -: limit / missed by / 90 % interval / from [0, 1, 2, 3, 4, 5, 6, 7, 8]
+margin ≥ 0.50 dB and ≤ 12.00 dB / 5 % / 2.5 % to 6.25 % / requirement.margin
+# Outputs
+Over the rows: mean, standard deviation, and the values that a share of the rows stays below, with their intervals.
+  “–”: not known, there are too few rows.
+| -: output / mean / deviation / 1 % / 50 % / 99 % [0]
+residual_quantile / 4.00 µrad / 1.50 µrad / 1.50 µrad; 750 nrad to 1.88 µrad / 3.00 µrad; 1.50 µrad to 3.75 µrad /
+  7.50 µrad; 3.75 µrad to 9.38 µrad
+margin / 4.00 dB / 1.50 dB / 1.50 dB; 0.75 dB to 1.88 dB / 3.00 dB; 1.50 dB to 3.75 dB / 7.50 dB; 3.75 dB to 9.38 dB
+# What they are
+| -: output / meaning [0, 1, 2, 3, 4, 5, 6, 7, 8]
+residual_quantile / what it is
+margin / what it is
+[campaign-residual_quantile]
+[campaign-margin]
+# Tail
+[campaign-tail]
+| -: probability / radial error / 90 % interval [0, 1, 2, 3, 4, 5, 6, 7, 8]
+10 % / 1.75 µrad / 1.50 µrad to 2.00 µrad
+0.1 % / 3.20 µrad / at least 3.00 µrad
+10⁻⁶ / not known /
+# What matters
+[campaign-sensitivity-1]
+| Every index and rank correlation: output / input / first order / total / rank correlation [0, 1]
+residual_quantile / jitter.rms / 0.50 (0.25 to 0.62) / 0.62 (0.60 to 0.75) / 0.75 (0.38 to 0.84)
+residual_quantile / mirror.alpha / 0.25 (0.12 to 0.31) / 0.30 (0.15 to 0.38) / −0.50 (−0.62 to −0.38)
+margin / mirror.alpha / 0.70 (−0.35 to 1.05) /  /
+# Where rows miss a limit
+[campaign-region]
+# Rows without results
+| -: row / seed / tries / reason [0, 1, 2, 3, 4, 5, 6, 7, 8]
+2 of mirror = a.toml, aperture = 5 cm / 99 / 3 / a reason
+# How the rows were made
+Sampling lhs, 2 drawn inputs, seed 77.
+Loop: PI, 5 s.
+Set: link.range = 1 km, b.c = 2.
+| -: input / distribution [0, 1, 2, 3, 4, 5, 6, 7, 8]
+mirror.alpha / normal
+jitter.rms / uniform
+| SHA-256 of what they depend on: of / SHA-256 [0, 1, 2, 3, 4, 5, 6, 7, 8]
+campaign / c
+mission / d
+code / e
+""")
+
+
+def test_outputs_that_are_the_same_in_every_row_stand_on_the_page_without_a_table():
+    even = replace(an_output("margin", "dB", 1.0), least=2.0, most=2.0)
+    (view,) = (
+        each
+        for summary in [a_campaign([replace(a_cell(), outputs={"margin": even})], limits=(), failed=())]
+        for each in campaign_module.campaign_views(summary, campaign_figures(summary))
+        if each.title == "Outputs"
+    )
+    assert outline(view) == one_text("""
+# Outputs
+The same in every row: margin 2.00 dB.
+# What they are
+| -: output / meaning [0, 1, 2, 3, 4, 5, 6, 7, 8]
+margin / what it is
+""")
+
+
+def test_the_head_of_a_page_names_campaign_digest_and_mission_and_has_verdict_progress_and_warnings(monkeypatch):
+    seen = []
+    monkeypatch.setattr(campaign_module, "page_of", lambda *args, **more: seen.append((args, more)) or "page")
+    summary = two_cells(hashes={"code": "e" * 64, "campaign": "c1" * 32}, warnings=("one", "two"))
+    assert campaign_page(summary) == "page"
+    ((title, kind, of, (lead, progress, *warned), views), more) = seen[0]
+    assert [title, kind, str(of), more] == [
+        "a",
+        "campaign",
+        f"<code>a.toml</code>, SHA-256 <code>{'c1' * 8}…</code>; mission: m",
+        {"sha256": "c1" * 32},
+    ]
+    assert (lead.headline, lead.good) == (campaign_words.headline(summary), None)
+    assert list(lead.blocks) == ["found", *campaign_words.answers(summary, summary.cells[1])]
+    assert progress.text == "Running: 41 of 64 rows, 2.05 rows a second, 5 min left."
+    assert warned == ["Warnings:", Points(("one", "two"))]
+    assert len(views) == 8
+    campaign_page(replace(summary, hashes={}, warnings=()))
+    (_, _, of, blocks, _), more = seen[1]
+    assert [str(of), len(blocks), more] == [
+        "<code>a.toml</code>, SHA-256 <code>…</code>; mission: m",
+        2,
+        {"sha256": ""},
+    ]
+
+
+def test_a_campaign_in_a_terminal_has_each_table_sentence_and_failed_row_in_its_place():
+    failed = tuple((0, Failed(k, 50 + k, k % 3 + 1, f"why {k}")) for k in range(12))
+    summary = a_campaign(
+        [a_cell(rows=32, failed=12, tail=short_tail())],
+        limits=TWO_SIDES[:1],
+        failed=failed,
+        findings=("one", "two"),
+        progress=Progress(32, 64, 90.0, 0.5, math.inf, "stopped"),
+    )
+    lines = [line.strip() for line in campaign_text(summary, 80).splitlines() if line.strip(" ─")]
+    assert [re.sub(r" {2,}", " / ", line) for line in lines] == [
+        "So far: 12 of 32 rows failed; 75 % of the other 20 rows keep residual_quantile ≤",
+        "6 µrad (68.8 % to 87.5 % at 90 % confidence).",
+        "one",
+        "two",
+        "Limits",
+        "limit / missed by / 90 % interval / from",
+        "residual_quantile ≤ 6 µrad / 25 % / 12.5 % to 31.2 % / requirement.pointi",
+        "ng_error",
+        "Outputs, and their quantiles over the rows",
+        "output / mean / deviation / 1 % / 50 % / 99 %",
+        "residual_quantile / 4.00 µrad / 1.50 µrad / 1.50 µrad / 3.00 µrad / 7.50 µrad",
+        "margin / 4.00 dB / 1.50 dB / 1.50 dB / 3.00 dB / 7.50 dB",
+        "What they are",
+        "output / meaning",
+        "residual_quantile / what it is",
+        "margin / what it is",
+        "Radial errors that are exceeded",
+        "probability / radial error / 90 % interval",
+        "10 % / 1.75 µrad / 1.50 µrad to 2.00 µrad",
+        "0.1 % / 3.20 µrad / at least 3.00 µrad",
+        "10⁻⁶ / not known",
+        "What matters most to residual_quantile (total Sobol index): jitter.rms 0.62",
+        "(0.60 to 0.75), mirror.alpha 0.30 (0.15 to 0.38); a note.",
+        "The radial error exceeds 3.20 µrad with probability 0.1 % (at least 3.00 µrad at",
+        "90 % confidence).",
+        "The radial error is beyond 2.5 µrad with probability 1 % (0.5 % to 2.5 % at 90 %",
+        "confidence). The variance of that estimate is 4e-08, that of 2.5e+05 draws",
+        "without importance sampling.",
+        "No radial error beyond 6 µrad was seen (0 % to 0.4 % at 90 % confidence).",
+        "Failed rows",
+        "row / seed / tries / reason",
+        *(f"{k} / {50 + k} / {k % 3 + 1} / why {k}" for k in range(10)),
+        "2 more failed rows are in the export.",
+        "Warning: a warning",
+        "Stopped after 32 of 64 rows; microrad campaign resume goes on from there.",
+    ]
+    grid = [line.strip() for line in campaign_text(two_cells(), 100).splitlines()]
+    for title in ("Limits", "Outputs", "Radial errors"):
+        assert any(line.startswith(f"{title} of mirror = a.toml, aperture = 5 cm") for line in grid)
+
+
+def test_a_worst_row_of_one_axis_begins_where_its_trace_does_and_has_four_drives_at_most():
+    error, drives = np.array([1e-6, -3e-6, 2e-6]), np.arange(15.0).reshape(3, 5)
+    trace = WorstTrace(0, 7, "margin", 1.25, np.array([0.5, 1.0, 1.5]), error, drives)
+    assert figure_of(drawing.worst(two_cells(), trace, 7)) == [
+        "campaign-worst-1-7",
+        "7th worst row in time",
+        "Row 7 of mirror = b.toml, aperture = 6 cm: of its rows the 7th worst in margin, 1.25 dB. Shown is the first "
+        "run of the row's.",
+        {
+            "time (s)": [0.5, 1.0, 1.5],
+            "radial error (rad)": [1e-6, 3e-6, 2e-6],
+            **{f"drive {k + 1} (V)": [k, k + 5.0, k + 10.0] for k in range(4)},
+        },
+        "Sheet width=7.6 height=3.4 heights=[1.3 1] share_x=True legend=<place=lower right>",
+        "Panel 0 0 x=<low=0.5 high=1.5> y=<title=radial error (µrad) low=0>",
+        "Line x=[0.5 1 1.5] y=[1 3 2] colour=#0072B2 width=0.8",
+        "Panel 1 0 x=<title=time (s) low=0.5 high=1.5> y=<title=drive (V)>",
+        "Line x=[0.5 1 1.5] y=[0 5 10] colour=#0072B2 width=0.8 label=drive 1",
+        "Line x=[0.5 1 1.5] y=[1 6 11] colour=#E69F00 width=0.8 label=drive 2",
+        "Line x=[0.5 1 1.5] y=[2 7 12] colour=#009E73 width=0.8 label=drive 3",
+        "Line x=[0.5 1 1.5] y=[3 8 13] colour=#56B4E9 width=0.8 label=drive 4",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("number", "unit", "name", "estimate", "given"),
+    [
+        (math.inf, "rad", "", "inf rad", "inf rad"),
+        (math.inf, "s", "", "never", "never"),
+        (-0.5, "dB", "", "−0.50 dB", "−0.50 dB"),
+        (12.5, "1", "margin", "12.5", "12.5"),
+        (1e-4, "1", "outage", "10⁻⁴", "10⁻⁴"),
+        (2e-4, "", "short", "2×10⁻⁴", "2×10⁻⁴"),
+        (0.5, "rad", "beyond_share", "500 mrad", "500 mrad"),
+        (0.25, "1", "beyond_share", "25 %", "25 %"),
+        (0.25, "1", "shared", "0.25", "0.25"),
+        (2e-5, "V", "", "20.0 µV", "20 µV"),
+        (41e9, "bit", "", "5.12 GB", "5.12 GB"),
+        (4e9, "bit", "", "500 MB", "500 MB"),
+        (180.0, "s", "", "3.00 min", "3 min"),
+        (-4e-6, "rad", "", "−4.00 µrad", "−4 µrad"),
+        (1234567.0, "1", "", "1.235e+06", "1.235e+06"),
+    ],
+)
+def test_an_estimate_has_three_digits_and_a_bound_those_it_was_given(number, unit, name, estimate, given):
+    assert (value(number, unit, name), campaign_numbers.bound(number, unit, name)) == (estimate, given)
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "name", "scale"),
+    [
+        ([-3e-5, 2e-6], "rad", "", (1e6, "µrad")),
+        ([9e-4], "", "outage", (1.0, "share")),
+        ([1e-3], "1", "a_share", (100.0, "%")),
+        ([-0.5, 1e-4], "1", "outage", (100.0, "%")),
+        ([5.0], "1", "", (1.0, "")),
+        ([3e3], "dB", "", (1.0, "dB")),
+        ([-8e9], "bit", "", (1.25e-10, "GB")),
+        ([math.inf, 3e-3, math.nan], "W", "", (1e3, "mW")),
+        ([math.nan], "rad", "", (1.0, "rad")),
+        ([], "V", "", (1.0, "V")),
+        ([119.0], "s", "", (1.0, "s")),
+        ([-120.0, 1.0], "s", "", (1.0 / 60.0, "min")),
+        ([7200.0], "s", "", (1.0 / 3600.0, "h")),
+        ([5e6], "bit/s", "", (1e-6, "Mbit/s")),
+    ],
+)
+def test_an_axis_takes_the_prefix_of_its_largest_value_of_either_sign(values, unit, name, scale):
+    found = campaign_numbers.scale_of(np.array(values, dtype=np.float64), unit, name)
+    assert (pytest.approx(found.factor), found.label) == scale
+    assert found.title("x") == (f"x ({scale[1]})" if scale[1] else "x")
+
+
+@pytest.mark.parametrize(
+    ("ends", "unit", "name", "said"),
+    [
+        ((5e-13, 0.9), "", "outage", "50 % (0 % to 90.0 %)"),
+        ((1e-12, 0.9), "", "outage", "50 % (10⁻¹² to 90.0 %)"),
+        ((5e-13, 5e-4), "", "outage", "50 % (0 to 5×10⁻⁴)"),
+        ((math.nan, 0.9), "1", "short", "50 % (at most 90.0 %)"),
+        ((0.25, math.nan), "1", "a_share", "50 % (at least 25 %)"),
+        ((math.nan, math.nan), "", "outage", "50 %"),
+        ((5e-13, 0.9), "rad", "outage", "500 mrad (0.500 prad to 900 mrad)"),
+        ((-0.25, 0.75), "dB", "", "0.50 dB (−0.25 dB to 0.75 dB)"),
+    ],
+)
+def test_an_estimate_stands_before_the_ends_that_are_known(ends, unit, name, said):
+    assert campaign_numbers.with_ends(Interval(0.5, *ends, 0.9), unit, name) == said
+
+
+def quantiles_at(*probabilities):
+    """An output whose quantiles are known at these probabilities: 1, 2, 3 … µrad."""
+    return an_output(quantiles={p: between_ends(1e-6 * k) for k, p in enumerate(probabilities, 1)})
+
+
+@pytest.mark.parametrize(
+    ("probabilities", "ends"),
+    [
+        ((0.004, 0.011, 0.016, 0.5, 0.984, 0.989, 0.997), (4, 2, 6)),
+        ((0.5, 0.2, 0.4, 0.6, 0.8), (1, 2, 5)),
+        ((0.2, 0.5), (2, 1, 9)),
+        ((0.5, 0.9), (1, 1, 2)),
+        ((0.01, 0.99), (4, 1, 9)),
+    ],
+)
+def test_a_combination_spans_its_known_quantiles_nearest_to_one_and_99_per_cent(probabilities, ends):
+    found = drawing._span(quantiles_at(*probabilities))
+    assert (found.value, found.low, found.high) == pytest.approx([1e-6 * end for end in ends])
+
+
+def test_a_region_over_one_input_without_a_unit_has_an_output_that_is_a_share_in_per_cent():
+    summary = a_campaign(
+        [replace(a_cell(), outputs={"outage": an_output("outage", "", 0.1)}, missed_by={"outage": between_ends(0.4)})],
+        limits=(Limit("outage", None, 0.2, "r"),),
+        inputs=(InputText("a.b", "", "u"),),
+        sample={key: np.array(column) for key, column in SHARES.items()},
+        sensitivities=(),
+        failed=(),
+    )
+    (found,) = campaign_module.region(summary)
+    assert figure_of(found)[2:] == [
+        "4 rows: those that keep outage ≤ 20 % and those that miss it, over a.b. Of all rows 40 % miss it.",
+        {"a.b": [0.1, 0.2, 0.3, 0.4], "outage": [0.1, 0.3, 0.15, 0.5]},
+        "Sheet width=7.6 height=4 legend=<place=upper right>",
+        "Panel 0 0 x=<title=a.b> y=<title=outage (%)>",
+        "Line x=[0.1 0.3] y=[10 15] colour=#0072B2 dash= label=kept marker=o size=3",
+        "Line x=[0.2 0.4] y=[30 50] colour=#D55E00 dash= label=missed marker=x size=4.7",
+        "Rule at=20 upright=False colour=#D55E00 dash=[5 2] width=1.4 label=limit ≤ 20 %",
+    ]
+
+
+SHARES = {"cell": [0.0] * 4, "row": [0.0, 1.0, 2.0, 3.0], "a.b": [0.1, 0.2, 0.3, 0.4], "outage": [0.1, 0.3, 0.15, 0.5]}
+
+
+def test_inputs_stand_by_the_largest_index_that_any_output_has_of_them():
+    i = between_ends
+    first, total = {"a.x": i(0.2), "b.y": i(0.55), "c.z": i(0.9)}, {"a.x": i(0.3), "c.z": i(0.7)}
+    one = Sensitivity("u", 9, {"a.x": i(0.6), "b.y": i(0.5), "c.z": i(0.1)}, {}, {}, 0.9, "")
+    other = Sensitivity("v", 8, first, total, {}, 0.9, "n")
+    (found,) = drawing.sensitivity(a_campaign([a_cell()], sensitivities=(one, other)))
+    assert found.title == "What matters to u, v"
+    assert found.caption == (
+        "Sobol indices from 8 rows: the share of an output's variance that an input makes by itself (first order), and "
+        "with all its interactions (total); with intervals. v: n."
+    )
+    assert [panel.y.ticks for panel in found.sheet.panels] == [{0: "c.z", 1: "a.x", 2: "b.y"}] * 2
+    assert list(found.columns)[5:] == ["v, c.z, first index", "v, a.x, total index", "v, c.z, total index"]
+
+
+def test_a_map_has_its_longer_key_downwards_and_is_as_high_as_that_has_steps():
+    cells = [a_cell({"m": m, "b.aperture": f"{k} cm"}) for m in "xy" for k in range(1, 6)]
+    turned = [a_cell({"b.aperture": f"{k} cm", "m": m}) for m in "xyz" for k in range(1, 10)]
+    (one,), (other,) = (drawing.grid(a_campaign(each, failed=())) for each in (cells, turned))
+    assert (one.sheet.height, other.sheet.height) == pytest.approx((2.8, 4.08))
+    assert [(p.x.title, p.y.title) for p in one.sheet.panels] == [("m", "b.aperture"), ("m", "")]
+    assert [(p.x.title, p.y.title) for p in other.sheet.panels] == [("m", "b.aperture"), ("m", "")]
+
+
+@pytest.mark.parametrize(
+    ("missed", "failed", "state", "word"),
+    [
+        ((0.0, 0.5), 0, "complete", "pass"),
+        ((0.0, 1.0), 0, "complete", "pass"),
+        ((0.5, 0.0), 0, "complete", "pass"),
+        ((0.0, 0.5), 0, "running", "open"),
+        ((0.0, 0.5), 0, "stopped", "open"),
+        ((0.0, 0.5), 1, "complete", "open"),
+        ((1.0, 1.0), 0, "complete", "fail"),
+        ((1.0, 1.0), 1, "running", "fail"),
+        ((1.0, 0.96), 0, "complete", "open"),
+        ((0.25, 0.0), 2, "complete", "open"),
+    ],
+)
+def test_one_combination_that_keeps_all_limits_is_enough_where_all_rows_are_there(missed, failed, state, word):
+    cells = [a_cell({"m": str(k)}, missed=each, failed=failed) for k, each in enumerate(missed)]
+    assert campaign_words.verdict(a_campaign(cells, progress=Progress(9, 9, 1.0, 9.0, 0.0, state))) == word
+
+
+def test_combinations_that_miss_as_often_are_alike_whatever_their_intervals():
+    other = replace(a_cell({"m": "b"}), missed=Interval(0.25, 0.2, 0.3, 0.9))
+    said = "So far: 2 of 42 rows failed; in each of 2 combinations 75 % of the rows keep both limits."
+    assert campaign_words.headline(a_campaign([a_cell({"m": "a"}), other])) == said
+
+
+def test_the_evenest_combination_is_of_the_limit_that_is_missed_most_often():
+    def split(first, second):
+        return {"margin": between_ends(first), "residual_quantile": between_ends(second)}
+
+    shares = [(1.0, 1.0), (0.75, 0.5), (0.6, 0.05), (0.0, 0.5)]
+    cells = [replace(a_cell({"m": str(k)}, missed=1.0), missed_by=split(*each)) for k, each in enumerate(shares)]
+    limit, number = campaign_module._split(a_campaign(cells, limits=TWO_SIDES[::-1]))
+    assert (limit.output, number) == ("margin", 2)
+    cells[0] = replace(cells[0], missed_by=split(0.125, 0.25))
+    limit, number = campaign_module._split(a_campaign(cells, limits=TWO_SIDES[::-1]))
+    assert (limit.output, number) == ("residual_quantile", 0)
+
+
+@pytest.mark.parametrize(
+    ("values", "high"),
+    [
+        ([0.0, 0.0, 0.0, 1.0], 0.25),
+        ([2.0, 5.0], 0.5),
+        ([-3.0] * 3 + [-1.0] * 5, 0.625),
+        ([0.0, 0.0, 0.5, 1.0], None),
+        ([0.0] * 400 + [1.0] * 599 + [0.9], None),
+        ([7.0] * 3, None),
+        ([1.0], None),
+    ],
+)
+def test_an_output_has_two_values_where_all_rows_lie_at_its_ends(values, high):
+    rows = np.array(values)
+    of = an_output(
+        rows=rows.size,
+        mean=between_ends(float(rows.mean())),
+        deviation=float(rows.std(ddof=1)) if rows.size > 1 else math.nan,
+        least=float(rows.min()),
+        most=float(rows.max()),
+    )
+    assert campaign_words.two_values(of) == (high if high is None else pytest.approx(high))
+
+
+@pytest.mark.parametrize(
+    ("radius", "ends"),
+    [
+        (3.5e-6, (0.0, 0.0, 0.007)),
+        (9e-6, (0.0, 0.0, 0.004)),
+        (1e-6, (0.5, 0.4, 0.6)),
+        (1.5e-6, (math.sqrt(0.025), math.sqrt(0.016), math.sqrt(0.042))),
+        (2.5e-6, (0.01, 0.0, math.sqrt(0.0007))),
+        (0.9e-6, None),
+    ],
+)
+def test_the_tail_between_two_radii_is_read_in_its_logarithm_and_beyond_the_last_by_its_upper_end(radius, ends):
+    found = campaign_words.beyond(short_tail(), radius)
+    assert (None if found is None else [found.value, found.low, found.high, found.confidence]) == (
+        None if ends is None else pytest.approx([*ends, 0.9])
     )

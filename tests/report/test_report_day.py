@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from drawn import plain
+from drawn import one_text, outline, plain
 from microrad import orbit, report
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs
@@ -27,7 +27,7 @@ from microrad.report.day import data as day_data_file
 from microrad.report.day import page as day_page_module
 from microrad.report.day import tables
 from microrad.report.day import words as day_words
-from microrad.report.day.constellation import plan_data, plan_sentences, plan_text
+from microrad.report.day.constellation import partners_table, plan_data, plan_sentences, plan_text, satellites_table
 from microrad.report.day.contact_run import contact_sentences, windows_table
 from microrad.report.day.figures import day_figures
 from microrad.report.quantities import duration, volume
@@ -1792,3 +1792,137 @@ def test_a_day_without_any_capacity_of_the_relay_leads_its_page_as_bad(monkeypat
     file, kind, (lead,), views = day_page_module.day_page(day, links)
     assert (file, kind, views) == (links.file, "contacts", ["inputs"])
     assert (lead.headline, lead.good) == ("headline", capacity_bit > 0.0)
+
+
+def test_the_view_of_a_rich_day_has_its_tables_and_opens_two_of_its_pictures():
+    figures = [SimpleNamespace(name=name, title=name.title()) for name in ("a-map", "data-volume", "day-timeline", "b")]
+    view = day_page_module.day_view(rich_day(), ["one said", "another"], figures, None, day_page_module.View("last"))
+    assert view.anchor == "delivers"
+    assert outline(view) == one_text("""
+# What the link delivers
+one said
+another
+Warnings:
+- one
+- two
+| What the ways could carry: 3 GB by relay and 6 GB by direct downlink and 9 GB by optical downlink; line by line:
+  / relay / direct downlink / optical downlink [0]
+contacts / 2 / 2 / 2
+time in contact / 100 min / 117 min / 133 min
+longest time without contact / 117 min / 2.19 h / 2.44 h
+could carry / 3 GB / 6 GB / 9 GB
+contacts without acquisition / 0.125 /  /
+made by the instrument / 300 GB / 300 GB / 300 GB
+lost for want of room / 10 GB / 11 GB / 12 GB
+on board at most / 20 GB / 21 GB / 22 GB
+on board at the end of what is followed / 5 GB / 6 GB / 7 GB
+arrive / 25 GB / 26 GB / 27 GB
+latency of what is kept, median / 30 s / 31 s / 32 s
+latency of what is kept, 99 % / 6.67 min / 8.33 min / 10 min
+| Every contact: by / rise (UTC) / set / min / range; (km) / point-ahead; (µrad) / rate; (µrad/s) / Doppler; (GHz) /
+  highest; (deg) / could; carry / begins and ends by [0, 10] brief [0, 1, 2, 3, 9, 10]
+a / 2026-03-20 00:08:20 / 00:15:20 / 7.00 /  /  /  /  / 41.0 / 2 GB / mask to the Earth
+HUB / 2026-03-20 00:10:00 / 00:22:30 / 12.50 / 2000 to 3000 / 30.0 / 700 / 4.00 /  / 1 GB / mask to Earth
+=c, optical / 2026-03-20 00:33:20 / 00:38:20 / 5.00 /  /  /  /  / 80.0 / 3 GB / mask to the Earth
+HUB / 2026-03-20 02:00:00 / 02:13:20 / 13.33 / 3000 to 4500 / 60.0 / 1400 / 8.00 /  / 2 GB / Earth
+b / 2026-03-20 02:01:40 / 02:03:10 / 1.50 /  /  /  /  / 12.3 / 4 GB / mask to the Earth
+a, optical / 2026-03-20 02:30:00 / 02:30:30 / 0.50 /  /  /  /  / 33.0 / 6 GB / mask to the Earth
+| Share of the time without clouds: optical station / clear / in the runs [0]
+=c / 30.0 % / 25.0 %
+a / 60.0 % / 65.0 %
+any of them / 68.0 % / 70.0 %
+any of them, were clouds independent / 72.0 % /
+| One assumption changed, all others as they are: assumption / changed to / relay / direct / ratio / 99 % by; relay
+  / 99 %; direct / optical / 99 %; optical [0, 1]
+rate / 1 Mbit/s / 250 GB / 375 GB / 0.667 / 4.17 min / 15.8 min / 62.5 GB / 60 min
+store / 1 GB / 1 TB / 0 B /  / 3.5 min / 15.2 min / 250 GB / 2.22 h
+store / 9 GB / 500 GB / 250 GB / 2 / 3.33 min / 15 min / 125 GB / 50 min
+# A-Map (folded)
+[a-map]
+[data-volume]
+[day-timeline]
+# B (folded)
+[b]
+# last
+""")
+
+
+@pytest.mark.parametrize(("warned", "warnings", "said"), [(True, ("w",), 0), (False, (), 0), (False, ("w",), 1)])
+def test_the_warnings_of_a_day_stand_in_its_view_unless_they_stand_elsewhere(warned, warnings, said):
+    lines = outline(day_page_module.day_view(rich_day(warnings=warnings), (), (), warned=warned)).split("\n")
+    assert lines.count("Warnings:") == lines.count("- w") == said
+
+
+@pytest.mark.parametrize(
+    ("days", "count", "said"),
+    [
+        (1.0, 3, "is in view 3 times, 90 min in all"),
+        (1.0 + 5e-10, 3, "is in view 3 times, 90 min in all"),
+        (2.0, 3, "is in view 3 times, 90 min in all (1.5 times, 45 min a day)"),
+        (0.5, 3, "is in view 3 times, 90 min in all"),
+        (1.5, 3, "is in view 3 times, 90 min in all (2 times, 60 min a day)"),
+        (3.0, 3, "is in view 3 times, 90 min in all (once, 30 min a day)"),
+        (10.0, 1, "is in view once, 90 min in all (0.1 times, 9 min a day)"),
+        (2.0, 0, "is never in view"),
+    ],
+)
+def test_contacts_are_told_by_the_day_from_more_than_one_day_on(days, count, said):
+    day = a_day(view=SimpleNamespace(days=days, duration_s=86400.0 * days, partner="relay"))
+    way = a_way(contacts=range(count))
+    assert day_words._how_much(day, way) == said
+    granted = said.replace("is never in view", "never grants the link").replace("is in view", "grants the link")
+    assert day_words._how_much(day, way, whole=False) == granted
+
+
+def test_a_plan_of_forty_satellites_is_whole_and_one_more_is_counted():
+    def plan(count):
+        every = SimpleNamespace(
+            **{
+                name: np.arange(1.0, count + 1)
+                for name in ("sessions", "served_s", "longest_gap_s", "busy_s", "volume_bit")
+            }
+        )
+        return rich_plan(satellites=tuple(f"n{k}" for k in range(count)), by_satellite=every, stations=())
+
+    whole, more = plan_text(plan(40), 200), plan_text(plan(41), 200)
+    assert " n39 " in whole and "--csv" not in whole
+    assert " n39 " in more and " n40 " not in more
+    assert more.endswith("The first 40 of 41 satellites; --csv has every session.")
+    assert "What each of them takes" not in whole and "ground" not in whole
+    assert "stations" not in plan_data(plan(2))
+
+
+@pytest.mark.parametrize(
+    ("relays", "terminals", "station_terminals", "begin"),
+    [
+        (("e",), 3, (), "2 satellites share 1 relay of 3 terminals: in"),
+        (("e", "w"), 1, (), "2 satellites share 2 relays of one terminal each: in"),
+        (("e",), 1, (2,), "2 satellites share 1 relay of one terminal and 1 ground station of 2 terminals: in"),
+        (
+            ("e",),
+            1,
+            (1, 1),
+            "2 satellites share 1 relay of one terminal and 2 ground stations of 2 terminals in all: in",
+        ),
+    ],
+)
+def test_relays_and_stations_of_a_plan_are_counted_each_in_its_number(relays, terminals, station_terminals, begin):
+    use = np.full(len(relays), 0.5)
+    stations = tuple(f"s{k}" for k in range(len(station_terminals)))
+    more = {"stations": stations, "station_terminals": station_terminals, "station_use": np.full(len(stations), 0.5)}
+    said = plan_sentences(rich_plan(relays=relays, terminals=terminals, use=use, **more))
+    assert said[0].startswith(begin) and len(said) == 3 + bool(stations)
+
+
+def test_the_numbers_of_relays_and_stations_are_named_by_what_each_is():
+    table = partners_table(rich_plan())
+    of = ["relays.east", "relays.west", "stations.kiruna", "stations.tromso"]
+    assert dict(table.names) == {
+        place: [f"constellation.{each}.{what}" for each in of]
+        for place, what in ((2, "sessions"), (3, "use"), (4, "volume_bit"))
+    }
+    assert dict(satellites_table(rich_plan()).names) == {
+        place: f"constellation.satellites.x.{what}"
+        for place, what in enumerate(("sessions", "with_data_s", "longest_gap_s", "volume_bit"), 1)
+    }
+    assert partners_table(rich_plan(stations=())) is None

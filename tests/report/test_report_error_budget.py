@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from budget_files import kept_study, looped_study
-from drawn import figure_of, plain
+from drawn import figure_of, one_text, outline, plain
 from microrad import report
 from microrad.link.error_budget import ErrorSource, Requirement, Share, Spread, assembly
 from microrad.loop.disturbance.windows import ErrorIndex
@@ -718,3 +718,113 @@ def test_arrays_of_two_unlike_requirements_as_a_whole():
             "density": [["source", "frequency"], "rad^2/Hz", [[4e-12, 2e-12, 1e-12], [1e-12, 8e-12, "nan"]]],
         },
     }
+
+
+def test_a_budget_of_two_requirements_has_each_number_in_its_own_column():
+    budget = SimpleNamespace(judged=two_requirements())
+    assert outline(
+        budget_view(budget, [SimpleNamespace(name="one"), SimpleNamespace(name="two")], ["more"])
+    ) == one_text("""
+# Pointing error budget
+| Requirements, µrad: requirement / what is kept, how often / by the rules / by the distribution / limit [0, 1]
+  cards
+code word / APE, radial, 99.73 % of the satellites and times / 6.00 FAIL / 4.00 PASS / 5.00
+slow drift / PDE 500 ms 3 s apart within 60 s, about y, 95 % of the satellites, at their worst time / 2.00 / 3.00 /
+| Contributions, µrad: source / class / statistic / code word / share / slow drift / share / from [0, 1, 2, 7] brief
+  [0, 3, 5] totals 1 cards
+bias / constant / statistic 4 / 1.00 / 25 % /  /  / origin 4
+wheel / loop / statistic 3 / 0.750 / 19 % /  /  / origin 3
+heat / drift / statistic 2 / 0.500 / 12 % / 0.375 / 12 % / origin 2
+tip tilt / random / statistic 1 / 0.250 / 6.2 % / 0.188 / 6.2 % / origin 1
+all /  /  / 4.00 /  / 3.00 /  /
+[one]
+[two]
+# code word: each source (folded)
+APE, radial, 99.73 % of the satellites and times, µrad.
+| -: source / mean / deviation / weight / total without it / may be [0] totals 1
+bias / 2.00 / 5.20 / 25 % / 5.00 /
+wheel / 1.50 / 3.90 / 19 % / 4.00 / nothing is left
+heat / 1.00 / 2.60 / 12 % / 3.00 / any
+tip tilt / 0.500 / 1.30 / 6.2 % / 2.00 / 1.5 times
+all / 1.00 / 1.50 / 100 % / 4.00 /
+# slow drift: each source (folded)
+PDE 500 ms 3 s apart within 60 s, about y, 95 % of the satellites, at their worst time, µrad.
+| -: source / mean / deviation / weight / total without it [0] totals 1
+tip tilt / 0.500 / 1.30 / 6.2 % / 2.00
+heat / 1.00 / 2.60 / 12 % / 3.00
+all / 1.00 / 1.50 / 100 % / 3.00
+- By the rules: abs(mean) + n_p deviations, about two axes of their lengths (ECSS-E-ST-60-10C 4.2.4). By the
+  distribution: the sources convolved, without the central limit; by it a requirement is judged.
+- Weight: growth of the total for a source that grows by 1 %, in percent. Contribution: that share of the total, so
+  that contributions add up to it. May be: how many times as large a source may be until the limit is met, the
+  others as they are.
+- What the loop leaves is that of linear theory: each hysteresis element counts by its slow gain, in a mirror of
+  several axes by that about rest.
+- The rules are too small for slow drift (33 %).
+- more
+""")
+
+
+def test_a_requirement_without_a_limit_has_no_column_of_what_may_be_and_alone_no_source_of_the_other():
+    view = budget_view(SimpleNamespace(judged=two_requirements()[1:]))
+    assert outline(view) == one_text("""
+# Pointing error budget
+| Requirements, µrad: requirement / what is kept, how often / by the rules / by the distribution / limit [0, 1]
+  cards
+slow drift / PDE 500 ms 3 s apart within 60 s, about y, 95 % of the satellites, at their worst time / 2.00 / 3.00 /
+| Contributions, µrad: source / class / statistic / slow drift / share / from [0, 1, 2, 5] brief [0, 3] totals 1
+  cards
+tip tilt / random / statistic 1 / 0.188 / 6.2 % / origin 1
+heat / drift / statistic 2 / 0.375 / 12 % / origin 2
+all /  /  / 3.00 /  /
+# slow drift: each source (folded)
+PDE 500 ms 3 s apart within 60 s, about y, 95 % of the satellites, at their worst time, µrad.
+| -: source / mean / deviation / weight / total without it [0] totals 1
+tip tilt / 0.500 / 1.30 / 6.2 % / 2.00
+heat / 1.00 / 2.60 / 12 % / 3.00
+all / 1.00 / 1.50 / 100 % / 3.00
+- By the rules: abs(mean) + n_p deviations, about two axes of their lengths (ECSS-E-ST-60-10C 4.2.4). By the
+  distribution: the sources convolved, without the central limit; by it a requirement is judged.
+- Weight: growth of the total for a source that grows by 1 %, in percent. Contribution: that share of the total, so
+  that contributions add up to it. May be: how many times as large a source may be until the limit is met, the
+  others as they are.
+- The rules are too small for slow drift (33 %).
+""")
+
+
+@pytest.mark.parametrize(
+    ("totals", "said"),
+    [
+        ([("a_b", 2.0, 4.0)], "The rules are too small for a b (50 %)."),
+        ([("a", 3.9961, 4.0), ("b", 3.9999, 4.0)], ""),
+        ([("a", 3.99, 4.0), ("b", 9.0, 4.0), ("c d", 3.0, 4.0)], "The rules are too small for a (0.25 %), c d (25 %)."),
+        ([("a", 1.0, 0.0)], ""),
+        ([("a", 4.0, 4.0)], ""),
+    ],
+)
+def test_the_rules_are_too_small_where_they_miss_the_total_by_more_than_a_thousandth(totals, said):
+    judged = [
+        SimpleNamespace(name=name, total=SimpleNamespace(by_rules_rad=rules, quantile_rad=whole), shares=())
+        for name, rules, whole in totals
+    ]
+    found = budget_words.remarks(judged)
+    assert found[2:] == ([said] if said else [])
+    looped = budget_words.remarks([*judged, SimpleNamespace(name="z", total=judged[0].total, shares=[LOOP])])
+    assert looped[2].startswith("What the loop leaves is that of linear theory: each hysteresis element")
+
+
+LOOP = SimpleNamespace(contribution=SimpleNamespace(kind="loop"))
+
+
+@pytest.mark.parametrize(
+    ("interpretation", "confidence", "axes", "said"),
+    [
+        ("temporal", 0.9973, (0, 1), "radial, 99.73 % of the time, on the worst satellite"),
+        ("ensemble", 0.5, (0,), "about x, 50 % of the satellites, at their worst time"),
+        ("mixed", 0.9995, (1,), "about y, 99.95 % of the satellites and times"),
+        ("temporal", 0.68, (2,), "about z, 68 % of the time, on the worst satellite"),
+    ],
+)
+def test_a_requirement_says_of_what_its_share_is(interpretation, confidence, axes, said):
+    required = Requirement(ErrorIndex("RPE", 0.25), confidence, interpretation, axes, None)
+    assert budget_words.requirement_text(required) == f"RPE 250 ms, {said}"

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from drawn import figure_of
+from drawn import figure_of, one_text, outline
 from drawn import plain as rounded
 from microrad import report
 from microrad.loop import control, controller_study
@@ -2137,3 +2137,204 @@ def test_each_kind_of_number_as_it_is_told(name, value, text):
 )
 def test_two_values_are_told_apart_by_up_to_seven_digits(one, other, unit, told):
     assert quantities.apart(one, other, unit) == told
+
+
+# ------------------------------------------------------------------------------------------------ the page as a whole
+def test_what_each_controller_leaves_stands_by_its_variant_with_limits_and_intervals(fine):
+    met = with_residual(fine, THIRD, "comparison", shares={"saturated": 0.25, "lost": 1e-6})
+    bare = replace(met.verified[0], simulated={"given": met.verified[0].simulated["given"]})
+    met = replace(met, verified=(bare, *met.verified[1:]))
+    assert outline(section.residuals_view(met, 4.5e-6)) == one_text("""
+# What each controller leaves
+Radial error at the line of sight in µrad: rms in theory (linear: no hysteresis, no limits), then as simulated on
+  each variant of the mirror. Required: at most 4.5 µrad for 99.7 % of the time.
+| -: controller / rms / rms / 99.7 % / largest / rms / 99.7 % / largest / rms / 99.7 % / largest [0] best [1]  1,
+  theory 1, mission's mirror 3, comparison model 3, no hysteresis 3
+PI, best of a gain grid / 1.58 / 2.11 ± 0.01 / 5.17 FAIL / 7.39 /  /  /  /  /  /
+PI + inverse in series / 1.72 / 2.25 ± 0.01 / 4.23 PASS / 6.45 / 2.36 ± 0.01 / 4.28 PASS / 6.50 / 1.74 ± 0.01 / 4.33
+  PASS / 6.55
+quick PI / 1.55 / 2.40 ± 0.01 / 6.41 FAIL / 8.63 / 2.51 ± 0.01 / 6.46 FAIL / 8.68 / 1.58 ± 0.01 / 6.51 FAIL / 8.73
+± is the 99 % interval of the rms over the runs. Bold and shaded: the best, by its error at 99.7 % on the mission's
+  mirror; the first is the baseline.
+Limits met, as a share of control samples (saturation, lost spot, the inverse's rate) or plant steps:
+- quick PI, comparison model: 25 % saturated, < 0.001 % lost
+""")
+
+
+def test_the_sines_stand_by_variant_and_one_that_was_not_run_is_empty(fine):
+    of = replace(fine, sines=fine.sines[1:])
+    assert outline(section.sines_view(of, 9.5e-6)) == one_text("""
+# The paper's sines under vibration and noise (folded)
+Fig. 6 and 8 again: a 300 µrad sine on axis x with vibration and sensor noise on both axes. Body pointing and point-
+  ahead are left out: the stroke would not hold them beside it. Radial error in µrad: rms / 99.7 %. While a sine of
+  the paper is tracked on the mission's mirror, the requirement is met at 25 Hz by none (least: 9.63 µrad, PI, best
+  of a gain grid); at 1 Hz by all controllers.
+| -: controller / 25 Hz / 1 Hz / 1 Hz / 25 Hz [0] best [1]  1, mission's mirror 2, comparison model 2
+PI, best of a gain grid / 2.00 / 9.63 FAIL /  / 2.00 / 7.23 PASS / 2.00 / 9.63 FAIL
+PI + inverse in series / 3.00 / 10.6 FAIL / 3.00 / 8.23 PASS / 3.00 / 8.23 PASS / 3.00 / 10.6 FAIL
+quick PI / 4.00 / 11.6 FAIL / 4.00 / 9.23 PASS / 4.00 / 9.23 PASS / 4.00 / 11.6 FAIL
+""")
+    assert section.sines_view(replace(fine, sines=()), 9.5e-6) is None
+
+
+def test_the_parts_of_a_loop_that_counts_as_linear_stand_beside_what_the_rest_adds(fine):
+    assert outline(section.budget_view(fine)) == one_text("""
+# Error budget of PI + inverse in series
+Without hysteresis the parts combine to what they leave together, to within 0.11 %. With it they still do, to within
+  0.77 %: the loop counts as linear.
+| -: part, by itself and without hysteresis / simulated, rms (µrad) / theory, rms (µrad) / share of variance [0]
+  totals 3
+vibration (OLYMPUS) / 3.00 / 3.10 / 98.3 %
+body pointing / 0.400 / 0.410 / 1.7 %
+quantisation / 0 /  / 0 %
+Root sum square of the parts / 3.03 / 3.13 /
+All together, without hysteresis / 3.03 /  /
+All together, the mission's mirror / 3.05 /  /
+| -: left out of the full loop / rms with it (µrad) / without it (µrad) / it adds (µrad) [0]
+hysteresis / 3.05 / 3.03 / 0.349
+computation delay / 3.05 / 2.00 / 2.30
+Added is the root of the difference of the squares; it is negative where the part helps.
+""")
+
+
+def tables_of(module, monkeypatch, made):
+    """The outline of the tables that a text for a terminal is made of."""
+    seen = []
+    monkeypatch.setattr(module, "tables_text", lambda tables, said, width: seen.extend(tables) or "text")
+    made()
+    return outline(*seen)
+
+
+def test_the_tables_of_a_recording_have_words_and_sums_where_they_are(monkeypatch):
+    loop = ns(timing=ns(step_s=1e-3, period_s=1.0 / 2000.0), disturbances=[[]])
+    both = tables_of(recorded, monkeypatch, lambda: recorded.recording_text("a", two_played_axes(), loop, "PI", 99))
+    left = "| Left by the loop under PI: axis / played / fitted / off by / simulated / mean / sensors [0]"
+    assert [line for line in both.split("\n") if line.startswith("|")] == [
+        "| Recorded: axis / mean / drift / rest / lines, amplitude [0, 4]",
+        "| Fitted: axis / states / worst / white residual / stationary [0, 3, 4]",
+        f"{left} totals 1",
+    ]
+    alone = tables_of(
+        recorded, monkeypatch, lambda: recorded.recording_text("a", two_played_axes()[:1], loop, "PI", 99)
+    )
+    assert f"{left}\n" in alone and "radial" not in alone
+
+
+def test_errors_in_windows_stand_by_source_with_a_sum_and_what_filters_make_of_those_with_a_window(monkeypatch):
+    first, second = two_indices()
+
+    def of(index, left, before, rational):
+        named = ({"OLYMPUS": one * 1e-6, "body": other * 1e-6} for one, other in (left, before))
+        return ns(index=index, left=next(named), before=next(named), rational=rational)
+
+    errors = [
+        of(ErrorIndex("APE"), (3.0, 4.0), (6.0, 8.0), 9e-6),
+        of(first, (1.0, 0.0), (5.0, 12.0), 1.43e-5),
+        of(second, (2.0, 1.5), (0.0, 0.0), 1e-6),
+        of(second, (2.0, 2.0), (1.0, 0.0), math.nan),
+    ]
+    assert tables_of(windows, monkeypatch, lambda: windows.windows_text(errors, "PI", 99)) == one_text("""
+| Left by the loop under PI: source / APE / RPE; 250 ms / PDE; 500 ms; 8 s apart / PDE; 500 ms; 8 s apart [0] totals
+  1
+vibration (OLYMPUS) / 3.00 / 1.00 / 2.00 / 2.00
+body / 4.00 / 0 / 1.50 / 2.00
+all / 5.00 / 1.00 / 2.50 / 2.83
+| Without the loop: source / APE / RPE; 250 ms / PDE; 500 ms; 8 s apart / PDE; 500 ms; 8 s apart [0] totals 1
+vibration (OLYMPUS) / 6.00 / 5.00 / 0 / 1.00
+body / 8.00 / 12.0 / 0 / 0
+all / 10.0 / 13.0 / 0 / 1.00
+| Without the loop, by linear filters: index / exact / rational / off by [0]
+RPE 250 ms / 13.0 / 14.3 / 10 %
+""")
+    kept = [(each["left_rad"]["all"], each["without_the_loop_rational_rad"]) for each in windows.windows_data(errors)]
+    assert [all_of for all_of, _ in kept] == pytest.approx([5e-6, 1e-6, 2.5e-6, math.sqrt(8.0) * 1e-6])
+    assert [rational for _, rational in kept] == [9e-6, 1.43e-5, 1e-6, None]
+
+
+def test_simulated_windows_have_their_interval_what_was_left_out_lost_and_coded():
+    first, second = two_indices()
+    errors = [
+        ns(index=first, linear_rad=1e-6, rms_rad=1.25e-6, interval_rad=5e-8, axis_rms_rad=np.array([1e-6, 7.5e-7])),
+        ns(index=second, linear_rad=2e-6, rms_rad=2.5e-6, interval_rad=math.inf, axis_rms_rad=np.array([2e-6, 1.5e-6])),
+    ]
+    shares = ns(value=0.0125, low=0.01, high=0.02), ns(value=0.5, low=0.25, high=0.75)
+    lost = ns(code_word_s=2e-4, words=4000, lost=shares[0], time=shares[1])
+    ratio = ns(value=1e-7, low=5e-8, high=math.inf)
+    given = {"code": "LDPC", "on_axis_db": 4.5, "target": 1e-6, "ratio": ratio, "penalty_db": 1.25, "span_s": 0.01}
+    coded = ns(interleaving="block", **given)
+    assert outline(simulated_windows.simulated_view(errors, lost, 12, [second, first], coded)) == one_text("""
+# Simulated, with hysteresis
+| Simulated, with hysteresis: index / linear / simulated / 99 % interval [0]
+RPE 250 ms / 1.00 / 1.25 / ± 0.050
+PDE 500 ms 8 s apart / 2.00 / 2.50 / unknown
+- Radial rms in µrad, both at the control samples: linear in theory, simulated on the mission's mirror. Number of
+  runs: 12; their spread gives the interval.
+- Longer than a run behind its settling, and left out: PDE 500 ms 8 s apart, RPE 250 ms.
+| Lost to pointing, simulated: share of / lost / 99 % interval [0]
+code words of 200 µs / 1.25 % / 1 % to 2 %
+time / 50 % / 25 % to 75 %
+- Of 4000 code words those whose mean power is less than the required margin asks for, and the share of the time
+  with less than that. Where none or all are lost, the interval takes them as independent.
+| Coded link, simulated: of the coded link / value / 99 % interval [0]
+mean bit error ratio / 10⁻⁷ / unknown
+power that pointing costs / 1.25 dB /
+- LDPC, BPSK with soft decisions, with a block interleaver over 10 ms, at 4.50 dB more on the axis than the code
+  needs at constant power; the cost brings the mean back to 10⁻⁶. Power falls with each simulated error as that of a
+  Gaussian beam, and stands still over a control sample.
+""")
+    coded.interleaving, coded.penalty_db, coded.ratio.high = "none", math.inf, 2e-7
+    assert outline(simulated_windows.simulated_view(errors[:1], None, 1, (), coded)) == one_text("""
+# Simulated, with hysteresis
+| Simulated, with hysteresis: index / linear / simulated / 99 % interval [0]
+RPE 250 ms / 1.00 / 1.25 / ± 0.050
+- Radial rms in µrad, both at the control samples: linear in theory, simulated on the mission's mirror. Number of
+  runs: 1; their spread gives the interval.
+| Coded link, simulated: of the coded link / value / 99 % interval [0]
+mean bit error ratio / 10⁻⁷ / 5×10⁻⁸ to 2×10⁻⁷
+power that pointing costs / beyond 20 dB /
+- LDPC, BPSK with soft decisions, without an interleaver, at 4.50 dB more on the axis than the code needs at
+  constant power; the cost brings the mean back to 10⁻⁶. Power falls with each simulated error as that of a Gaussian
+  beam, and stands still over a control sample.
+""")
+    assert [each["interval_rad"] for each in simulated_windows._indices(errors)] == [5e-8, None]
+
+
+@pytest.mark.parametrize(
+    ("values", "units", "said"),
+    [
+        ({"gain": 1234.5, "lead": 0.5}, {"gain": "Hz"}, "gain 1.23 kHz, lead 0.5"),
+        ({"shift": -0.25, "time": 2e-3}, {"time": "s", "shift": ""}, "shift −0.25, time 2 ms"),
+        ({}, {"a": "s"}, ""),
+    ],
+)
+def test_what_a_controller_was_tuned_to_has_the_units_that_there_are(values, units, said):
+    assert words.tuned_to(values, units) == said
+
+
+@pytest.mark.parametrize(
+    ("rms", "half", "said"),
+    [
+        (2.11e-6, 0.012e-6, "2.11 ± 0.01"), (2.11e-6, 0.2e-6, "2.1 ± 0.2"), (12.34e-6, 3e-6, "12 ± 3"),
+        (12.34e-6, 30e-6, "12 ± 30"), (2.1111e-6, 1e-10, "2.111 ± 0.001"), (2.11e-6, 0.0, "2.11"),
+        (2.11e-6, math.inf, "2.11"), (2.11e-6, 0.1001e-6, "2.1 ± 0.1"),
+    ],
+)  # fmt: skip
+def test_an_rms_has_the_decimals_that_its_interval_leaves_it(rms, half, said):
+    assert section.with_interval(ns(rms_rad=rms, rms_interval_rad=half)) == said
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "text"),
+    [
+        *(("duration", (119.4,), "119 s"), ("duration", (120.0,), "2 min"), ("duration", (7199.0,), "120 min")),
+        *(("duration", (7200.0,), "2 h"), ("duration", (0.0,), "0 s"), ("duration", (-7200.0,), "−2 h")),
+        *(("counted", (0, "row"), "0 rows"), ("counted", (1, "row"), "1 row")),
+        *(("are", (0,), "are"), ("are", (1,), "is"), ("are", (2,), "are"), ("percent", (0.0,), "0 %")),
+        *(("percent", (0.12345, 4), "12.35 %"), ("percent", (-1.0,), "−100 %"), ("plain", (-1e21,), "−1e+21")),
+        *(("plain", (123456.0, 2), "120000"), ("plain", (math.inf,), "inf"), ("volume", (0.0,), "0 B")),
+        *(("power_text", (0.00096, 2), "9.6×10⁻⁴"), ("power_text", (1.0,), "10⁰"), ("power_text", (0.0,), "0")),
+        *(("micro", (math.nan,), ""), ("micro", (math.inf,), "inf"), ("angle", (0.0,), "0 µrad")),
+    ],
+)
+def test_numbers_at_the_turns_of_their_units_and_with_digits_of_their_own(name, given, text):
+    assert getattr(quantities, name)(*given) == text

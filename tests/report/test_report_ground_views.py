@@ -3,13 +3,16 @@
 import csv
 import io
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from drawn import one_text, outline
 from ground_files import STILL, TYPED, UP, ground_file
 from microrad import link
+from microrad.core.budget import Line
 from microrad.link import study as link_study
 from microrad.link.ground import AtElevation, GroundLink, OtherConvention, ground_link
 from microrad.report.links import ground
@@ -237,3 +240,74 @@ def test_an_elevation_typed_beside_flying_orbits_is_flagged_with_the_range(tmp_p
     assert "typed beside the table orbit" in space.warning
     assert "from 500 km up the range at 20 deg is 1193 km" in space.warning
     assert any("1193 km" in each for each in budget.warnings)
+
+
+def test_links_to_a_station_through_turbulent_air_have_each_number_of_an_elevation():
+    elevations = [
+        AtElevation(
+            (20 + 15 * k) * deg,
+            9e5 - 1e5 * k,
+            1.5 - k / 4,
+            2.5 - k,
+            0.05 + k / 100,
+            1.2e-5 + k * 1e-6,
+            0.375 - k / 8,
+            0.25,
+            2.0 + 2.5 * k,
+        )
+        for k in range(2)
+    ]
+    conventions = (
+        OtherConvention("channel.conventions.wind", "one", "two", {"Communication": -0.5, "Beacon": 0.25}),
+        OtherConvention("channel.conventions.scale", "in", "out", {"Communication": 0.125, "Beacon": -0.75}),
+    )
+    line = Line("Rytov variance", 0.25, "", "a basis", "a source", "a regime")
+    g = GroundLink("geo", "Teide", tuple(elevations), (("Beacon", (line,)),), conventions)
+    requirement = SimpleNamespace(margin_db=3.0)
+    study = SimpleNamespace(ground=g, file=SimpleNamespace(mission=SimpleNamespace(requirement=requirement)))
+    pictures = [SimpleNamespace(name=name) for name in ("other", ground.OVER_ELEVATION)]
+    assert outline(ground.ground_view(study, pictures)) == one_text("""
+# Down to the station
+- The links are budgeted at 20 deg of elevation, 900 km from Teide.
+- The communication link has 2.50 dB more at 35 deg.
+- Of the elevations below it has the required 3 dB from 35 deg on.
+- Of the conventions that the literature leaves open, channel.conventions.scale matters most: "out" in place of "in"
+  moves the margin of beacon by 0.75 dB.
+| Communication over elevation: elevation / range / air / fades / r0 / isoplanatic / index / margin [0] brief [0, 1,
+  2, 3, 6, 7]
+20 deg / 900 km / 1.50 dB / 2.50 dB / 50 mm / 12 µrad / 0.25 / +2.00 dB
+35 deg / 800 km / 1.25 dB / 1.50 dB / 60 mm / 13 µrad / 0.25 / +4.50 dB
+[margin-over-elevation]
+| Turbulence on the path: Beacon: line / value / basis / source / holds for [0, 2, 3, 4]
+Rytov variance / 0.25 / a basis / a source / a regime
+| What other conventions would change: convention / as given / read as / communication / beacon [0, 1, 2]
+wind / one / two / −0.50 dB / +0.25 dB
+scale / in / out / +0.12 dB / −0.75 dB
+Closed forms over flat air; a scintillation index is that of any strength, spread and wander those of weak
+  turbulence; clouds are outside. Lost in the air is the mean power, by absorption, scattering, a wider beam and a
+  wavefront that a fibre takes less of; to fades is lost what they add for the mission's outage.
+""")
+    assert [ground.ground_data(g)[key] for key in ("conventions", "beams")] == [
+        [{"key": c.key, "given": c.given, "other": c.other, "gained_db": c.gained_db} for c in conventions],
+        [
+            {
+                "name": "Beacon",
+                "lines": [
+                    {"name": "Rytov variance", "value": 0.25, "unit": "", "basis": "a basis", "source": "a source"}
+                ],
+            }
+        ],
+    ]
+    up = replace(
+        g, end="leo", elevations=tuple(replace(e, index=math.nan) for e in elevations), beams=(), conventions=()
+    )
+    assert outline(ground.ground_view(SimpleNamespace(ground=up, file=study.file))) == one_text("""
+# Up from the station
+- The links are budgeted at 20 deg of elevation, 900 km from Teide.
+- The communication link has 2.50 dB more at 35 deg.
+- Of the elevations below it has the required 3 dB from 35 deg on.
+| Communication over elevation: elevation / range / air / margin [0]
+20 deg / 900 km / 1.50 dB / +2.00 dB
+35 deg / 800 km / 1.25 dB / +4.50 dB
+Flat and still air without clouds. Lost in it is what absorption and scattering take.
+""")

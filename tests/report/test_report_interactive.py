@@ -1988,3 +1988,223 @@ def test_a_legend_without_a_place_keeps_clear_of_bars(upright):
     (key,), (placed,) = found.keys, found.placed
     left, top, right, bottom = placed.inner
     assert (key.x < (left + right) / 2.0) if upright else (key.y > (top + bottom) / 2.0)
+
+
+def three_unlike_panels():
+    """A panel over two, with what `every_kind` has not: turned axes, open markers, lying bars, legends beside."""
+    sheet = Sheet(5.0, 4.0, (1.0, 2.0), (2.0, 1.0), legend=Legend("right", 1, "Key", GREY, 7.0))
+    sheet.heading, sheet.heading_at_left, sheet.heading_colour = "Left <head>", True, BLUE
+    wide, low, ring = sheet.panel(0, 0, 2), sheet.panel(1, 0), sheet.panel(1, 1)
+    x, apart = np.array([0.0, 1.0, 3.0]), np.array([0.0, 1.0])
+    wide.add(
+        Line(x, x * x, BLUE, "-.", 0.8, "two\nlines", marker="^", size=4.0, edge=BLACK),
+        Rule(2.0, True, ORANGE, (2.0, 1.0), 0.5, "rule"),
+        Line(x, 3 * x, VERMILION, "", label="open", marker="o", face="", edge_width=0.4),
+        Line(x, 4 * x, SKY, "", marker="|", size=3.0),
+        Span(1.0, math.inf, False, SKY, 0.15, "shade"),
+    )
+    wide.x, wide.y, wide.framed = Axis("x (m)", low=3.0, high=0.0, most=3), Axis("y", size=7.0, most=4), True
+    low.add(
+        Bars(apart, apart + 1.0, 4.0 - apart, 0.5 - apart / 4, VERMILION, opacity=0.5, edge=BLACK, label="lying"),
+        Words("right & mid", 4.0, 0.0, GREY, 6.0, "end", "bottom", (-2.0, 5.0), box=True),
+        Words("gone", math.nan, 0.0),
+        Words("", 1.0, 0.0),
+    )
+    low.y, low.x, low.legend = rows(["first", "second\nrow"], 7.0), Axis("value (dB)", grid=False), Legend("below", 2)
+    outer, inner = ([[1.0, 1.0], [10.0, 1.0], [10.0, 100.0]], [[2.0, 1.5], [5.0, 1.5], [5.0, 3.0]])
+    ring.add(Area((np.array(outer), np.array(inner)), BLUE, 0.7, "ring", GREY, 0.6))
+    ring.x, ring.y = Axis("f (Hz)", log=True, most=4), Axis(log=True, labelled=False)
+    ring.title, ring.title_size = "C", 7.5
+    return sheet
+
+
+def wrapped(text):
+    return textwrap.wrap(text, 108, break_long_words=False, break_on_hyphens=False)
+
+
+def test_a_picture_of_three_unlike_panels_is_the_same_to_a_hundredth_of_a_point():
+    drawn = svg_of(three_unlike_panels()).split("\n")
+    assert [part for line in drawn[1:-2] for part in wrapped(line)] == [
+        '<text x="3.00" y="11.55" font-size="9" fill="#0072B2">Left &lt;head&gt;</text>',
+        '<path d="M295.93 22.20V80.39M121.59 22.20V80.39" stroke="#dddddd" stroke-width="0.6" fill="none"/>',
+        '<path d="M34.42 77.74H295.93M34.42 33.66H295.93" stroke="#dddddd" stroke-width="0.6" fill="none"/>',
+        '<svg x="34.42" y="22.20" width="261.51" height="58.19"><g transform="translate(-34.42 -22.20)">',
+        '<path d="M295.93 77.74L208.76 73.33L34.42 38.07" fill="none" stroke="#0072B2" stroke-width="0.8"',
+        'stroke-dasharray="5.12 1.28 0.8 1.28"/>',
+        '<path d="M293.93 79.74h4l-2 -4ZM206.76 75.33h4l-2 -4ZM32.42 40.07h4l-2 -4Z" fill="#0072B2" stroke="#000000"',
+        'stroke-width="1"/>',
+        '<path d="M121.59 80.39V22.20" fill="none" stroke="#E69F00" stroke-width="0.5" stroke-dasharray="1 0.5"/>',
+        '<path d="M292.93 77.74a3 3 0 1 0 6 0a3 3 0 1 0 -6 0ZM205.76 64.52a3 3 0 1 0 6 0a3 3 0 1 0 -6 0ZM31.42',
+        '38.07a3 3 0 1 0 6 0a3 3 0 1 0 -6 0Z" fill="none" stroke="#D55E00" stroke-width="0.4"/>',
+        '<path d="M295.93 76.24v3M208.76 58.61v3M34.42 23.34v3" fill="none" stroke="#56B4E9" stroke-width="1"/>',
+        '<rect x="34.42" y="22.20" width="261.51" height="51.13" fill="#56B4E9" fill-opacity="0.15"/>',
+        "</g></svg>",
+        '<path d="M34.42 22.20V80.39H295.93V22.20ZM295.93 80.39v3.5M121.59 80.39v3.5M34.42 77.74h-3.5M34.42',
+        '33.66h-3.5" stroke="#1b1f24" stroke-width="0.8" fill="none"/>',
+        '<text x="295.93" y="95.44" font-size="9" text-anchor="middle">0</text>',
+        '<text x="121.59" y="95.44" font-size="9" text-anchor="middle">2</text>',
+        '<text x="27.92" y="80.19" font-size="7" text-anchor="end">0</text>',
+        '<text x="27.92" y="36.11" font-size="7" text-anchor="end">10</text>',
+        '<text x="165.18" y="109.24" font-size="9" text-anchor="middle">x (m)</text>',
+        '<text x="10.56" y="54.44" font-size="9" text-anchor="middle" transform="rotate(-90 10.56 51.29)">y</text>',
+        '<svg x="34.42" y="123.49" width="168.34" height="116.37"><g transform="translate(-34.42 -123.49)">',
+        '<path d="M42.07 142.00H195.11V168.45H42.07ZM93.08 201.51H144.10V214.73H93.08Z" fill="#D55E00"',
+        'fill-opacity="0.5" stroke="#000000" stroke-width="0.5"/>',
+        "</g></svg>",
+        '<path d="M34.42 123.49V239.86H202.76M42.07 239.86v3.5M93.08 239.86v3.5M144.10 239.86v3.5M195.11',
+        '239.86v3.5M34.42 155.22h-3.5M34.42 208.12h-3.5" stroke="#1b1f24" stroke-width="0.8" fill="none"/>',
+        '<text x="42.07" y="254.91" font-size="9" text-anchor="middle">1</text>',
+        '<text x="93.08" y="254.91" font-size="9" text-anchor="middle">2</text>',
+        '<text x="144.10" y="254.91" font-size="9" text-anchor="middle">3</text>',
+        '<text x="195.11" y="254.91" font-size="9" text-anchor="middle">4</text>',
+        '<text x="27.92" y="157.67" font-size="7" text-anchor="end">first</text>',
+        '<text x="27.92" y="206.37" font-size="7" text-anchor="end"><tspan x="27.92" y="206.37">second</tspan><tspan',
+        'x="27.92" y="214.77">row</tspan></text>',
+        '<text x="118.59" y="268.71" font-size="9" text-anchor="middle">value (dB)</text>',
+        '<rect x="159.27" y="143.02" width="33.84" height="7.20" fill="#ffffff" fill-opacity="0.75"/>',
+        '<text x="193.11" y="148.72" font-size="6" text-anchor="end" fill="#777777">right &amp; mid</text>',
+        '<path d="M215.59 123.49V239.86M292.10 123.49V239.86" stroke="#dddddd" stroke-width="0.6" fill="none"/>',
+        '<path d="M211.76 234.57H295.93M211.76 181.67H295.93M211.76 128.78H295.93" stroke="#dddddd"',
+        'stroke-width="0.6" fill="none"/>',
+        '<svg x="211.76" y="123.49" width="84.17" height="116.37"><g transform="translate(-211.76 -123.49)">',
+        '<path d="M215.59 234.57L292.1 234.57L292.1 128.78ZM238.62 225.26L269.07 225.26L269.07 209.33Z"',
+        'fill="#0072B2" fill-opacity="0.7" fill-rule="evenodd" stroke="#777777" stroke-width="0.6"/>',
+        "</g></svg>",
+        '<path d="M211.76 123.49V239.86H295.93M215.59 239.86v3.5M292.10 239.86v3.5M211.76 234.57h-3.5M211.76',
+        "181.67h-3.5M211.76 128.78h-3.5M212.08 239.86v2M215.59 239.86v2M238.62 239.86v2M252.09 239.86v2M261.65",
+        "239.86v2M269.07 239.86v2M275.13 239.86v2M280.25 239.86v2M284.69 239.86v2M288.60 239.86v2M292.10",
+        "239.86v2M211.76 239.70h-2M211.76 236.99h-2M211.76 234.57h-2M211.76 218.65h-2M211.76 209.33h-2M211.76",
+        "202.72h-2M211.76 197.60h-2M211.76 193.41h-2M211.76 189.87h-2M211.76 186.80h-2M211.76 184.09h-2M211.76",
+        "181.67h-2M211.76 165.75h-2M211.76 156.44h-2M211.76 149.83h-2M211.76 144.70h-2M211.76 140.51h-2M211.76",
+        '136.97h-2M211.76 133.90h-2M211.76 131.20h-2M211.76 128.78h-2" stroke="#1b1f24" stroke-width="0.8"',
+        'fill="none"/>',
+        '<text x="215.59" y="254.91" font-size="9" text-anchor="middle">1</text>',
+        '<text x="292.10" y="254.91" font-size="9" text-anchor="middle">10</text>',
+        '<text x="253.84" y="268.71" font-size="9" text-anchor="middle">f (Hz)</text>',
+        '<text x="211.76" y="118.61" font-size="7.5">C</text>',
+        '<rect x="96.45" y="276.28" width="20.00" height="6.40" fill="#D55E00" fill-opacity="0.5" stroke="#000000"',
+        'stroke-width="0.5"/>',
+        '<text x="121.45" y="282.28" font-size="8">lying</text>',
+        '<text x="310.93" y="29.45" font-size="7" fill="#777777">Key</text>',
+        '<path d="M310.93 37.29h20" fill="none" stroke="#0072B2" stroke-width="0.8" stroke-dasharray="5.12 1.28 0.8',
+        '1.28"/>',
+        '<path d="M318.93 39.29h4l-2 -4Z" fill="#0072B2" stroke="#000000" stroke-width="1"/>',
+        '<text x="335.93" y="39.74" font-size="7" fill="#777777"><tspan x="335.93" y="39.74">two</tspan><tspan',
+        'x="335.93" y="48.14">lines</tspan></text>',
+        '<path d="M310.93 55.35h20" fill="none" stroke="#E69F00" stroke-width="0.5" stroke-dasharray="1 0.5"/>',
+        '<text x="335.93" y="57.80" font-size="7" fill="#777777">rule</text>',
+        '<path d="M317.93 65.01a3 3 0 1 0 6 0a3 3 0 1 0 -6 0Z" fill="none" stroke="#D55E00" stroke-width="0.4"/>',
+        '<text x="335.93" y="67.46" font-size="7" fill="#777777">open</text>',
+        '<rect x="310.93" y="71.47" width="20.00" height="6.40" fill="#56B4E9" fill-opacity="0.15"/>',
+        '<text x="335.93" y="77.12" font-size="7" fill="#777777">shade</text>',
+        '<rect x="310.93" y="81.13" width="20.00" height="6.40" fill="#D55E00" fill-opacity="0.5" stroke="#000000"',
+        'stroke-width="0.5"/>',
+        '<text x="335.93" y="86.78" font-size="7" fill="#777777">lying</text>',
+        '<rect x="310.93" y="90.79" width="20.00" height="6.40" fill="#0072B2" fill-opacity="0.7" stroke="#777777"',
+        'stroke-width="0.5"/>',
+        '<text x="335.93" y="96.44" font-size="7" fill="#777777">ring</text>',
+    ]
+
+
+def test_the_interactive_form_of_three_unlike_panels_has_what_each_legend_switches():
+    plot = plot_of(three_unlike_panels())
+    of = plot.pop("layout")
+    assert {key: of[key] for key in interactive._COMMON} == interactive._COMMON
+    axes = [of[f"{which}axis{number}"] for which in "xy" for number in ("", 2, 3)]
+    assert [axis["range"] for axis in axes] == [
+        [3, 0],
+        [0.85, 4.15],
+        [-0.05, 1.05],
+        [-0.6, 12.6],
+        [1.6, -0.6],
+        [-0.1, 2.1],
+    ]
+    assert [axis["showgrid"] for axis in axes] == [True, False, True, True, False, True]
+    assert wrapped(json.dumps({**plot, "drawn": [of["shapes"], of["annotations"]]}, ensure_ascii=False)) == [
+        '{"size": [480.0, 384.0], "keys": [{"title": "", "entries": [{"label": "lying", "area": "rgba(213,94,0,0.5)",',
+        '"data": [3], "shapes": []}]}, {"title": "Key", "entries": [{"label": "two\\nlines", "line": {"color":',
+        '"#0072B2", "width": 1.07, "dash": "dashdot"}, "marker": {"symbol": "triangle-up", "size": 5.33, "color":',
+        '"#0072B2", "line": {"color": "#000000", "width": 1.33}}, "data": [0], "shapes": []}, {"label": "rule",',
+        '"line": {"color": "#E69F00", "width": 0.67, "dash": "1.33px,0.67px"}, "data": [], "shapes": [0]}, {"label":',
+        '"open", "marker": {"symbol": "circle-open", "size": 8.0, "color": "#D55E00", "line": {"color": "#D55E00",',
+        '"width": 0.53}}, "data": [1], "shapes": []}, {"label": "shade", "area": "rgba(86,180,233,0.15)", "data": [],',
+        '"shapes": [1]}, {"label": "lying", "area": "rgba(213,94,0,0.5)", "data": [3], "shapes": []}, {"label":',
+        '"ring", "area": "rgba(0,114,178,0.7)", "data": [], "shapes": [2]}]}], "data": [{"xaxis": "x", "yaxis": "y",',
+        '"name": "two<br>lines", "type": "scatter", "mode": "lines+markers", "x": [0, 1, 3], "y": [0, 1, 9],',
+        '"hovertemplate": "x: %{x:.5~g} m<br>y: %{y:.5~g}<extra>%{fullData.name}</extra>", "line": {"color":',
+        '"#0072B2", "width": 1.07, "dash": "dashdot", "shape": "linear", "simplify": false}, "marker": {"symbol":',
+        '"triangle-up", "size": 5.33, "color": "#0072B2", "line": {"color": "#000000", "width": 1.33}}}, {"xaxis":',
+        '"x", "yaxis": "y", "name": "open", "type": "scatter", "mode": "markers", "x": [0, 1, 3], "y": [0, 3, 9],',
+        '"hovertemplate": "x: %{x:.5~g} m<br>y: %{y:.5~g}<extra>%{fullData.name}</extra>", "marker": {"symbol":',
+        '"circle-open", "size": 8.0, "color": "#D55E00", "line": {"color": "#D55E00", "width": 0.53}}}, {"xaxis":',
+        '"x", "yaxis": "y", "name": "", "type": "scatter", "mode": "markers", "x": [0, 1, 3], "y": [0, 4, 12],',
+        '"hovertemplate": "x: %{x:.5~g} m<br>y: %{y:.5~g}<extra>%{fullData.name}</extra>", "marker": {"symbol":',
+        '"line-ns-open", "size": 4.0, "color": "#56B4E9", "line": {"color": "#56B4E9", "width": 1.33}}}, {"xaxis":',
+        '"x2", "yaxis": "y2", "name": "lying", "type": "bar", "orientation": "h", "x": [3, 1], "y": [0, 1], "width":',
+        '[0.5, 0.25], "base": [1, 2], "marker": {"color": "rgba(213,94,0,0.5)", "line": {"width": 0.5, "color":',
+        '"#000000"}}, "hovertext": ["first<br>value: 1 to 4 dB", "second row<br>value: 2 to 3 dB"], "hovertemplate":',
+        '"%{hovertext}<extra>%{fullData.name}</extra>"}], "panels": [{"x": "xaxis", "y": "yaxis", "inner": [45.9,',
+        '29.6, 394.6, 107.2], "outer": [6.9, 22.4, 402.6, 148.6], "titles": {"xaxis": "x (m)", "yaxis": "y"}}, {"x":',
+        '"xaxis2", "y": "yaxis2", "inner": [45.9, 164.6, 270.3, 319.8], "outer": [4.0, 157.4, 278.3, 380.0],',
+        '"titles": {"xaxis2": "value (dB)", "yaxis2": ""}}, {"x": "xaxis3", "y": "yaxis3", "inner": [282.3, 164.6,',
+        '394.6, 319.8], "outer": [278.3, 148.6, 402.6, 361.3], "titles": {"xaxis3": "f (Hz)", "yaxis3": ""}}],',
+        '"scales": [], "heading": [{"text": "Left <head>", "color": "#0072B2"}], "ratio": false, "drawn": [[{"type":',
+        '"line", "layer": "above", "x0": 2, "x1": 2, "xref": "x", "y0": 0, "y1": 1, "yref": "y domain", "line":',
+        '{"color": "#E69F00", "width": 0.67, "dash": "1.33px,0.67px"}}, {"type": "rect", "layer": "below", "x0": 0,',
+        '"x1": 1, "xref": "x domain", "y0": 1, "y1": 12.6, "yref": "y", "fillcolor": "rgba(86,180,233,0.15)", "line":',
+        '{"width": 0}}, {"type": "path", "path": "M1,1L10,1L10,100ZM2,1.5L5,1.5L5,3Z", "fillrule": "evenodd", "xref":',
+        '"x3", "yref": "y3", "layer": "between", "fillcolor": "rgba(0,114,178,0.7)", "line": {"color": "#777777",',
+        '"width": 0.8}}], [{"text": "right &amp; mid", "showarrow": false, "borderpad": 0, "font": {"size": 8.0,',
+        '"color": "#777777"}, "x": 4, "xref": "x2", "xshift": -2.67, "y": 0, "yref": "y2", "yshift": 6.67, "xanchor":',
+        '"right", "yanchor": "bottom", "bgcolor": "rgba(255,255,255,0.75)"}, {"text": "C", "xref": "x3 domain",',
+        '"yref": "y3 domain", "x": 0, "y": 1, "yshift": 3, "xanchor": "left", "yanchor": "bottom", "showarrow":',
+        'false, "font": {"size": 12}}]]}',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("both", "said"),
+    [
+        *(((2.0, 2.0), "no change"), ((1.0, 3.0), ""), ((2.0, 3.0), ""), ((math.nan, 3.0), "lower: no value")),
+        *(
+            ((1.0, math.inf), "higher: without bound"),
+            ((-math.inf, math.nan), "lower: without bound, higher: no value"),
+        ),
+    ],
+)
+def test_a_row_of_bars_says_what_they_do_not_show(both, said):
+    (panel,) = one().panels
+    swing_bars(panel, ["a"], [both], 2.0)
+    (remark,) = panel.all_of(Words)
+    assert (remark.text, remark.x, remark.y, remark.colour, remark.shift, remark.of_panel) == (
+        said,
+        1.0,
+        0,
+        GREY,
+        (5, 0),
+        "x",
+    )
+    assert [bar.colour for bar in panel.all_of(Bars)] == [
+        colour
+        for end, colour in sorted(zip(both, (ORANGE, BLUE), strict=True), key=lambda b: -abs(b[0] - 2.0))
+        if not math.isnan(end)
+    ]
+
+
+def test_a_figure_has_its_title_as_text_alternative_and_a_hatching_of_its_own():
+    hatched = Area((np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]),), BLACK, hatched=True)
+    figure = Figure("a b/é", 'A "quoted" <title> & more', "c", one(hatched), {"x": np.array([1.5]), "n": ("a",)})
+    assert figure.id == "a-b--"
+    assert 'role="img" aria-label="A &quot;quoted&quot; &lt;title&gt; &amp; more"' in figure.labelled
+    assert (
+        'id="a-b---1"' in figure.labelled
+        and 'fill="url(#a-b---1)"' in figure.labelled
+        and "hatch" not in figure.labelled
+    )
+    assert (figure.static.plot, figure.static.name, figure.rows(3)) == ("", "a b/é", [("1.5", "a")])
+    figure.take("<svg kept/>", "kept")
+    assert (figure.svg, figure.plot, figure.labelled) == (
+        "<svg kept/>",
+        "kept",
+        '<svg role="img" aria-label="A &quot;quoted&quot; &lt;title&gt; &amp; more" kept/>',
+    )

@@ -13,7 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from drawn import figure_of
+from drawn import figure_of, one_text, outline
+from drawn import plain as rounded
 from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad import link
 from microrad.core.budget import Line
@@ -24,6 +25,7 @@ from microrad.link.requirement import Requirement
 from microrad.mission.file import load_link
 from microrad.report import requirements
 from microrad.report.links import budgets as budget_views
+from microrad.report.links import data as links_numbers
 from microrad.report.links import figures as link_module
 from microrad.report.links import views as links
 from microrad.report.links import words as links_words
@@ -1165,3 +1167,340 @@ def test_an_interleaver_is_drawn_with_what_it_costs_at_each_span():
         "Rule at=3.5 upright=False colour=#D55E00 dash=: label=what the margin can spare",
         "Line x=[10] y=[2] dash= label=this mission marker=D size=7",
     ]
+
+
+# ------------------------------------------------------------------------------------ views of numbers that are made up
+def a_way_to_find(name, k, possible=True):
+    """A way of two stages and a run of two transitions, each number unlike others."""
+    stages = [
+        SimpleNamespace(
+            name=f"s{j}", longest_s=2.0 * j + k, success_probability=0.9 - j / 8 - k / 64, on_failure=f"f{j}"
+        )
+        for j in (1, 2)
+    ]
+    log = [SimpleNamespace(stage=f"s{j}", to=f"t{j}", cause=f"c{j}", time_s=1.5 * j + k) for j in (1, 2)]
+    return SimpleNamespace(
+        name=name,
+        stages=stages,
+        log=log,
+        possible=possible,
+        outcome=SimpleNamespace(success_probability=0.96875 - k / 32, mean_time_s=12.5 + k),
+        early_s=80.0 + k if possible else math.nan,
+        simulated_probability=0.9375 - k / 32,
+        simulated_mean_s=13.5 + k if possible else math.nan,
+        simulated=SimpleNamespace(locked=np.array([possible, False, possible])),
+    )
+
+
+def a_finding(**scan):
+    given = {
+        "radius_rad": 4.5678e-4, "half_angle_rad": 7.5e-5, "duration_s": 33.0, "stated_detection_s": 0.02,
+        "needed_detection_s": 0.015, "detects": True,
+    }  # fmt: skip
+    chances = SimpleNamespace(
+        beacon_coverage=0.98765, answer_coverage=0.87654, answer_detection=0.76543, return_coverage=0.65432
+    )
+    return SimpleNamespace(
+        chances=chances,
+        sigma_rad=1.2345e-4,
+        beacon_radius_rad=3.4567e-4,
+        ways=[a_way_to_find("wide beacon", 0), a_way_to_find("scan", 1, possible=False)],
+        scanned=SimpleNamespace(**given | scan) if scan is not None else None,
+    )
+
+
+def test_two_ways_to_find_the_partner_have_each_ones_own_numbers_stages_and_run():
+    pictures = [
+        SimpleNamespace(name=name, title=f"of {name}") for name in ("tornado-a", links_words.INTERLEAVER, "trade")
+    ]
+    found = a_finding(needed_detection_s=0.03)
+    view = links.acquisition_view(found, pictures)
+    assert outline(view) == one_text("""
+# Acquisition
+Exact sums over all orders of failures beside a seeded simulation of the same process. The wide beacon covers its
+  partner with a probability of 0.9877 (its power suffices out to 346 µrad off axis), the answer lands with 0.8765
+  and is seen with 0.7654, the narrow beam back lands with 0.6543. The random part of the pointing error is drawn
+  anew at each attempt; biases stand at their bounds.
+The scan covers 457 µrad about the predicted direction, for an uncertainty of 123 µrad rms per axis with biases, in
+  33 s at most. At the edge of its beam the partner's sensor needs 30 ms in place of the 20 ms that are stated; the
+  scan waits.
+| -: way / lock / simulated / mean time / simulated / 90 % within [0]
+wide beacon / 0.9688 / 0.9375 / 12.5 s / 13.5 s / 80 s
+scan / never / 0.9062 / – / none locks / –
+# Stages of the wide beacon, and one simulated run (folded)
+| -: stage / at most / succeeds / else back to [0, 3]
+s1 / 2 s / 0.7750 / f1
+s2 / 4 s / 0.6500 / f2
+| One simulated run: stage / goes to / cause / time [0, 1, 2]
+s1 / t1 / c1 / 1.500 s
+s2 / t2 / c2 / 3.000 s
+# Stages of the scan, and one simulated run (folded)
+| -: stage / at most / succeeds / else back to [0, 3]
+s1 / 3 s / 0.7594 / f1
+s2 / 5 s / 0.6344 / f2
+| One simulated run: stage / goes to / cause / time [0, 1, 2]
+s1 / t1 / c1 / 2.500 s
+s2 / t2 / c2 / 4.000 s
+# of trade (folded)
+[trade]
+""")
+    assert [each.listed for each in view.views] == [False, False, False]
+    assert rounded(links_numbers.finding_data(found)) == {
+        "uncertainty_per_axis_rad": 1.2345e-4,
+        "beacon_coverage": 0.98765,
+        "answer_coverage": 0.87654,
+        "answer_detection": 0.76543,
+        "return_coverage": 0.65432,
+        "scan_s": 33.0,
+        "scan_radius_rad": 4.5678e-4,
+        "scan_half_angle_rad": 7.5e-5,
+        "scan_stated_detection_s": 0.02,
+        "scan_needed_detection_s": 0.03,
+        "ways": [
+            {
+                "name": name,
+                "success_probability": 0.96875 - k / 32,
+                "mean_time_s": None if k else 12.5,
+                "simulated_success_probability": 0.9375 - k / 32,
+                "simulated_mean_time_s": None if k else 13.5,
+                "runs": 3,
+                "stages": [
+                    {"name": f"s{j}", "longest_s": 2.0 * j + k, "success_probability": 0.9 - j / 8 - k / 64}
+                    for j in (1, 2)
+                ],
+            }
+            for k, name in enumerate(("wide beacon", "scan"))
+        ],
+    }
+
+
+@pytest.mark.parametrize(
+    ("needed_s", "detects", "said"),
+    [
+        (0.015, True, ", in 33 s at most."),
+        (0.02, True, ", in 33 s at most."),
+        (
+            0.021,
+            True,
+            (
+                ", in 33 s at most. At the edge of its beam the partner's sensor needs 21 ms in place of the 20 "
+                "ms that are stated; the scan waits."
+            ),
+        ),
+        (
+            5e9,
+            False,
+            (
+                ". It detects nothing: at the edge of its beam the partner's sensor would need more than "
+                "1000000 s in place of the 20 ms that are stated."
+            ),
+        ),
+    ],
+)
+def test_a_scan_waits_where_its_light_needs_longer_than_is_stated(needed_s, detects, said):
+    begin = (
+        "The scan covers 457 µrad about the predicted direction, for an uncertainty of 123 µrad rms per "
+        "axis with biases"
+    )
+    of = a_finding(needed_detection_s=needed_s, detects=detects)
+    assert links.scan_words(of.scanned, of.sigma_rad) == begin + said.replace(
+        "1000000 s", quantity(LONGEST_LOOK_S, "s")
+    )
+    data = links_numbers.finding_data(of)
+    assert (data["scan_s"], data["scan_needed_detection_s"]) == ((33.0, needed_s) if detects else (None, None))
+
+
+def a_pointing(reading=True):
+    """Two errors, two totals, and a beacon that covers one of them."""
+    made = [Line(f"error {k}", 1e-5 * k, "rad", f"basis {k}", f"source {k}", f"regime {k}") for k in (1, 2)]
+    sums = [
+        SimpleNamespace(
+            name=f"rule {k}",
+            rule=f"r{k}",
+            total_rad=3e-5 * k,
+            of=f"of {k}",
+            formula=f"f {k}",
+            authority=f"a {k}",
+            caveat=f"c {k}",
+        )
+        for k in (1, 2)
+    ]
+    allowed = {"rss": ("", 4.5e-5), "ecss-radial": ("more than all", 0.0)}
+    own, other = (
+        SimpleNamespace(
+            convention=f"angle {k}",
+            half_angle_rad=4.4444e-5 * k,
+            coverage=0.98765 / k,
+            covers=k == 1,
+            confident_divergence_rad=1.2345e-4,
+        )
+        for k in (1, 2)
+    )
+    return SimpleNamespace(
+        lines=made,
+        variance_shares=(0.125, 0.875),
+        summations=sums,
+        confidence=0.9973,
+        reading=own if reading else None,
+        counter_reading=other if reading else None,
+        allocation=lambda half, rule: [
+            SimpleNamespace(name=f"error {k}", note=allowed[rule][0], largest_rad=allowed[rule][1] * k, missing_rad=0.0)
+            for k in (1, 2)
+        ],
+    )
+
+
+def test_open_loop_errors_have_what_they_may_be_and_totals_with_what_the_beacon_covers():
+    assert outline(links.pointing_view(a_pointing())) == one_text("""
+# Open-loop pointing
+| -: error source / half width / share of squares / largest allowed / largest allowed,; ECSS / how it counts /
+  source [0, 5, 6] brief [0, 1, 2, 3, 5, 6]
+error 1 / 10 µrad / 12.5 % / 45 µrad / nothing / basis 1 / source 1
+error 2 / 20 µrad / 87.5 % / 90 µrad / nothing / basis 2 / source 2
+Largest allowed: the half width at which the root sum square, or the total of ECSS for two axes, equals the beacon's
+  half angle (44.4 µrad), with all other errors as they are.
+| Totals at 99.73 %: rule 1 30 µrad; rule 2 60 µrad: total / value / beacon's half angle / of / formula / where it
+  is authorised / what speaks against it here [0, 2, 3, 4, 5, 6]
+rule 1 / 30 µrad / covers it, 14.4 µrad left / of 1 / f 1 / a 1 / c 1
+rule 2 / 60 µrad / 15.6 µrad short / of 2 / f 2 / a 2 / c 2
+Read as angle 1, the beacon's half angle is 44.4 µrad, at least the root sum square of one axis. It covers the
+  partner with a probability of 0.9877; both axes and their biases are counted. 99.73 % would take a divergence of
+  123 µrad. Read as angle 2, the half angle is 88.9 µrad and the probability 0.4938.
+""")
+
+
+def test_open_loop_errors_without_a_beacon_have_neither_what_they_may_be_nor_a_coverage():
+    assert outline(links.pointing_view(a_pointing(reading=False))) == one_text("""
+# Open-loop pointing
+| -: error source / half width / share of squares / how it counts / source [0, 3, 4]
+error 1 / 10 µrad / 12.5 % / basis 1 / source 1
+error 2 / 20 µrad / 87.5 % / basis 2 / source 2
+| Totals at 99.73 %: rule 1 30 µrad; rule 2 60 µrad: total / value / of / formula / where it is authorised / what
+  speaks against it here [0, 2, 3, 4, 5]
+rule 1 / 30 µrad / of 1 / f 1 / a 1 / c 1
+rule 2 / 60 µrad / of 2 / f 2 / a 2 / c 2
+""")
+
+
+def a_performance(k, **changes):
+    given = {
+        "source": f"source {k}", "controller": f"c{k}", "mirror": "given",
+        "jitter": SimpleNamespace(bias_rad=(3e-6 * k, 0.0), rms_rad=(0.0, 4e-6 * k)),
+        "mean_loss_db": 0.125 * k, "outage_loss_db": 0.5 * k, "uncoded_penalty_db": 0.75 * k, "margin_db": 2.5 - k,
+        "outage": 0.0125 * (k - 1), "short": 2e-4 * k, "data_rate_bit_s": 622.08e6 / k,
+        "fades_per_s": math.nan, "fade_s": 0.001 * k, "fade_warning": "",
+        "best": SimpleNamespace(half_angle_rad=1.5e-5 * k, at_limit=k == 2, current_excess_db=0.0625 * k),
+    }  # fmt: skip
+    return SimpleNamespace(**given | changes)
+
+
+def test_the_link_under_four_pointing_errors_has_each_ones_numbers_and_what_hysteresis_costs():
+    cases = [
+        a_performance(1),
+        a_performance(2, mirror="comparison", controller="c1"),
+        a_performance(3, uncoded_penalty_db=math.inf),
+    ]
+    cases.append(a_performance(4, data_rate_bit_s=math.nan, uncoded_penalty_db=math.nan))
+    costs = [
+        SimpleNamespace(source="source 3", controller="c3", mirror="given", margin_db=-0.375, data_rate_bit_s=-51e6),
+        SimpleNamespace(source="source 4", controller="c4", mirror="given", margin_db=0.004, data_rate_bit_s=math.nan),
+    ]
+    assert outline(links.performance_view(cases, costs, 0.003, ["said"], "c1")) == one_text("""
+# What pointing costs the link
+said
+| The link under each of 4 pointing errors: pointing error from / controller / mirror / rms (µrad) / mean loss (dB)
+  / loss at 0.3 % (dB) / penalty without a code (dB) / margin at 0.3 % (dB) / outage / below required margin / best
+  half angle (µrad) / lost against it (dB) / data rate (Mbit/s) / hysteresis costs (dB) / and (Mbit/s) [0, 1, 2]
+  best [0] brief [0, 1, 2, 3, 5, 7, 8]
+source 1 / c1 / given / 5.00 / 0.12 / 0.50 / 0.75 / +1.50 / none / 2.0e-04 / 15.0 / 0.06 / 622 /  /
+source 2 / c1 / comparison / 10.00 / 0.25 / 1.00 / 1.50 / +0.50 / 1.2 % / 4.0e-04 / 30.0* / 0.12 / 311 /  /
+source 3 / c3 / given / 15.00 / 0.38 / 1.50 / beyond any power / −0.50 / 2.5 % / 6.0e-04 / 45.0 / 0.19 / 207 / 0.38
+  / 51
+source 4 / c4 / given / 20.00 / 0.50 / 2.00 / unknown / −1.50 / 3.8 % / 8.0e-04 / 60.0 / 0.25 / none / 0.00 /
+Rms: radial, about zero. Penalty, the power that the errors cost: with a code the mean loss where its interleaver
+  spans many fades, the loss at the outage where it spans none; without a code what brings the mean bit error ratio
+  back to its target, in a Gaussian beam, unknown for a receiver that is given by its sensitivity alone. Outage:
+  share of the time with a margin below 0 dB. Best half angle: of a Gaussian beam, at 1/e2, with the most power at
+  the error of that column; a star: the present one, since a narrower one would take a larger aperture. Data rate:
+  the largest with the required margin at that loss. What hysteresis costs: against the same controller and the same
+  errors on a mirror without it.
+""")
+    three = links.performance_table(cases[:3], (), 0.003)
+    assert (three.folded, len(three.headings), three.best) == ("", 13, [])
+
+
+@pytest.mark.parametrize(
+    ("per_s", "said"),
+    [
+        ([math.nan], []),
+        (
+            [1e-9, math.nan, 0.0],
+            ["Fades below the required margin: less than one a year, for Gaussian errors of these spectra."],
+        ),
+        (
+            [2.5, 1e-9, math.nan],
+            [
+                (
+                    "Fades below the required margin, for Gaussian errors of that rms and spectrum: c1: 2.5 a "
+                    "second of 1 ms each; c2: less than one a year."
+                ),
+                "Warned 1.",
+            ],
+        ),
+        (
+            [1e-9, 40.0],
+            [
+                (
+                    "Fades below the required margin, for Gaussian errors of that rms and spectrum: c1: less than "
+                    "one a year; c2: 40 a second of 2 ms each."
+                ),
+                "Warned 1.",
+            ],
+        ),
+    ],
+)
+def test_fades_are_told_of_the_cases_whose_spectrum_is_known_with_one_doubt(per_s, said):
+    cases = [a_performance(k, fades_per_s=each, fade_warning=f"warned {k}") for k, each in enumerate(per_s, 1)]
+    assert links.fade_sentences(cases) == said
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"),
+    [
+        ((1.23456, 2.34567, False, False), "from 1.235 m to 2.346 m"),
+        ((1.23456, 2.34567, True, False), "up to 2.346 m"),
+        ((1.23456, 2.34567, False, True), "from 1.235 m on"),
+        ((1.23456, 2.34567, True, True), "wherever it was looked at"),
+    ],
+)
+def test_a_span_of_a_solved_key_has_four_digits_at_the_ends_that_it_has(ends, said):
+    low, high, low_open, high_open = ends
+    of = SimpleNamespace(low=low, high=high, low_open=low_open, high_open=high_open)
+    assert links_words._span(of, "m") == said
+
+
+def test_an_input_of_a_tornado_is_told_with_three_digits_and_without_its_table():
+    assert link_module._label(SimpleNamespace(key="communication.a.b", value=1234.56, unit="W")) == "a.b = 1.23 kW"
+    assert (
+        link_module._label(SimpleNamespace(key="channel.loss", value=-1.2345, unit="dB")) == "channel.loss = -1.23 dB"
+    )
+
+
+def test_light_on_a_tracking_sensor_has_its_angle_where_there_is_one():
+    line = Line("read-out", 2e-9, "W", "b", "s", "r", "w")
+    of = Tracking(3e-9, 7.5, (line,), replace(line, name="angle", value=4e-7, unit="rad"))
+    told = {
+        "name": "read-out",
+        "value": 2e-9,
+        "unit": "W",
+        "basis": "b",
+        "source": "s",
+        "holds_for": "r",
+        "warning": "w",
+    }
+    base = {"power_w": 3e-9, "signal_to_noise": 7.5, "lines": [told]}
+    assert links_numbers._tracking(of) == {**base, "noise_equivalent_angle_rad": 4e-7}
+    assert links_numbers._tracking(replace(of, noise_equivalent_angle=None)) == {
+        **base,
+        "noise_equivalent_angle_rad": None,
+    }

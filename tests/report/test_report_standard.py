@@ -6,9 +6,11 @@ import json
 import re
 from dataclasses import replace
 from html import unescape
+from types import SimpleNamespace
 
 import pytest
 
+from drawn import one_text, outline
 from link_files import data_with, received_with, written
 from microrad.link import compliance
 from microrad.link import study as link_study
@@ -229,3 +231,26 @@ def test_each_kind_of_requirement_is_told_with_where_it_is_asked():
         **{"bit_error_ratio": 1e-9, "source": "a source", "value": 622.09e6, "text": ""},
         **{"judgement": "does not meet", "why": ""},
     }
+
+
+def test_a_standard_has_each_requirement_with_its_judgement_and_where_it_comes_from():
+    standard = SimpleNamespace(title="A standard", version="3.1", note="a note", name="s")
+    counts = {"meets": 2, "does not meet": 1, "not said": 3, "outside microrad": 1}
+    of = SimpleNamespace(standard=standard, held=ODD[:3] + ODD[6:7], count=counts.__getitem__)
+    assert outline(shown.standard_view(of)) == one_text("""
+# A standard
+Of 4 requirements that public sources print of it, up to version 3.1, 2 are met and 1 is not; the mission does not
+  say 3, and 1 is outside microrad.
+| -: requirement / number / asked / mission has /  / what it is / why / source [0, 1, 2, 4, 5, 6, 7] cards
+a subject / 7.1 (3.1) / at least 2.5 µW/m^2 at 5500 km / 3.1 µW/m^2 / PASS / what it is / by the budget / a source
+a subject / 7.1 (3.1) / at most 622.08 Mbit/s at a bit error ratio of 1e-09 / 622.09 Mbit/s / FAIL / what it is /  /
+  a source
+a subject / 7.1 (3.1) / at least 250 mW at 1234 km at a bit error ratio of 2e-05 / – / not said / what it is / say
+  it / a source
+a subject / 7.1 (3.1) / – / – / outside microrad / what it is / no model of it / a source
+a note
+""")
+    short = shown.short_view(of)
+    assert [type(block).__name__ for block in short.blocks] == ["str", "Table"]
+    assert list(short.blocks[1].headings) == ["requirement", "number", "asked", "mission has", ""]
+    assert list(short.blocks[1].words) == [0, 1, 2, 4]

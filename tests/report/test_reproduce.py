@@ -6,6 +6,8 @@ import math
 import platform
 import re
 import shutil
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -1158,3 +1160,364 @@ def test_tables_are_compared_by_column_and_row_with_the_unit_of_the_heading():
             "",
         ),
     ]
+
+
+# ------------------------------------------------------------------------------------------- line by line: what is told
+@pytest.mark.parametrize(
+    ("was", "now", "share", "allowed", "line"),
+    [
+        (1.0, 1.0000000001, 1e-10, 0.0, "was 1 and is 1.0000000001, relative difference 1e-10"),
+        (-0.0, 0.0, 0.0, 1e-15, "was -0 and is 0, relative difference 0 (1e-15 apart is allowed)"),
+        (True, 1, math.nan, 0.0, "was True and is 1"),
+        ([1], "x\x1b", math.nan, 0.0, r"was [1] and is x\u001b"),
+        (2.0**30 + 0.125, 2.0**30 + 0.25, 1.2e-10, 0.5, "1073741824.125 and is 1073741824.25, relative diff"),
+        (None, math.nan, math.nan, 0.0, "was None and is nan"),
+        (10**20, 1e20 + 20000, 2e-16, 0.0, "was 1e+20 and is 1.0000000000000002e+20, relative difference 2e-16"),
+        (math.inf, 3, math.inf, 0.0, "was inf and is 3, relative difference inf"),
+    ],
+)
+def test_a_difference_has_as_many_digits_as_it_takes(was, now, share, allowed, line):
+    found = compared.Difference("a\tb", was, now, share, allowed)
+    assert str(found).startswith(r"a\u0009b: was ") and line in str(found)
+    known = share if math.isfinite(share) else None
+    assert found.data() == {
+        **{"place": "a\tb", "was": was, "now": now},
+        **{"relative_difference": known, "allowed_distance": allowed},
+    }
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "same"),
+    [
+        *(("x 1.0", "x 1.1", True), ("x 10", "x 11", False), ("x 100", "x 104", True), ("x 100", "x 106", False)),
+        *(("x 100", "x 105.2", True), ("x 105.2", "x 100", True), ("x 100", "x 105.3", False)),
+        *(("x 1.00", "x 1.02", True), ("x 1.00", "x 1.06", False), ("x 0.010", "x 0.011", True), ("0", "1", False)),
+        *(("−3.0 dB", "-3.1 dB", True), ("a1", "a2", False), ("1e-3", "1.02e-3", True), ("1.0e-3", "1.1e-3", False)),
+        *(("1 2", "1 2 3", False), (True, 1, False), (None, None, True), ("5", "five", False), ([], [], True)),
+        *(
+            ("+2.5", "-2.5", False),
+            ("", "", True),
+            (None, "", False),
+            ("PASS", "FAIL", False),
+            ("7 of 9", "9 of 9", False),
+        ),
+    ],
+)
+def test_words_are_the_same_up_to_roundings_and_other_values_if_they_are_equal(was, now, same):
+    assert compared._same(was, now, False) is same
+    assert compared._same(was, now, True) is (type(was) is type(now) and was == now)
+
+
+@pytest.mark.parametrize(
+    ("value", "number"), [(3, True), (0.5, True), (True, False), ("3", False), (None, False), (math.nan, True)]
+)
+def test_a_truth_value_is_no_number(value, number):
+    assert compared.is_number(value) is number
+
+
+def test_trees_of_lists_within_lists_have_their_places_and_the_unit_above_them():
+    was = {"unit": "m", "rows": [[1.0, 2.0], [3.0]], "deep": {"value": 4.0}}
+    now = {"unit": "s", "rows": [[1.0], [3.0, 5.0]], "deep": {"value": 6.0}}
+    assert list(compared.leaves(was, now, "top")) == [
+        ("top.unit", "s", "m", "s"),
+        ("top.rows[0][0]", "s", 1.0, 1.0),
+        ("top.rows[0][1]", "s", 2.0, compared.MISSING),
+        ("top.rows[1][0]", "s", 3.0, 3.0),
+        ("top.rows[1][1]", "s", compared.MISSING, 5.0),
+        ("top.deep.value", "", 4.0, 6.0),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "lines"),
+    [
+        ("a (m)\n1\n2", "a (m)\n1\n2", []),  # no end of the last line
+        ("a\n", "a\n", []),
+        ("", "a\n1\n", ["f: a: was (none) and is a column"]),
+        ("a,b\n1\n2,3\n", "a,b\n1\n2,3,4\n", []),
+        ("a\n1\nx\n", "a\n1\ny\n", ["f: a, row 2: was x and is y"]),
+        ("b,a\n1,2\n", "a,b\n2,4\n", ["f: b, row 1: was 1 and is 4, relative difference 0.75"]),
+        ("a\nnan\n", "a\n", ["f: a: was a column and is (none)"]),
+    ],
+)
+def test_tables_with_odd_ends_are_compared_cell_by_cell(was, now, lines):
+    found = compared.compare_tables("f", was, now, None)
+    assert [str(each) for each in found.differences] == lines
+
+
+def a_page(*body):
+    return "\n".join(
+        ["<html>", "<style>", "x", "</style>", *body, manifest.OPENING + "{}" + manifest.ENDING, "</html>"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "told"),
+    [
+        (["<p>a</p>"], ["<p>a</p>"], ()),
+        (["<p>a <b>b</b></p>"], ["<i>a</i> b"], ()),
+        (["<p>a</p>", "<p>b</p>"], ["<p>b</p>"], ("line 5: a",)),
+        (["<p>b</p>"], ["<p>a</p>", "<p>b</p>"], ("1 lines of this run's page are not in it",)),
+        (
+            ["<svg>", "1", "</svg>", "z"],
+            ["<svg>2</svg>", "y"],
+            ("line 8: z", "1 lines of this run's page are not in it"),
+        ),
+        (["s", "s", "t"], ["s", "t", "u", "v"], ("line 5: s", "2 lines of this run's page are not in it")),
+        (["<script>", "1", "2", "</script>e"], ["e"], ()),
+    ],
+)
+def test_lines_of_a_page_are_told_by_their_number_in_the_file(was, now, told):
+    assert reproduce._lines(a_page(*was), a_page(*now)) == told
+
+
+@pytest.mark.parametrize(
+    ("text", "moved", "written", "found"),
+    [
+        ("x named-0.csv y", {"a&b.csv": "named-0.csv"}, lambda name: name.replace("&", "&amp;"), "x a&amp;b.csv y"),
+        ('"n1" "n2"', {'q"': "n1", "é": "n2"}, reproduce._in_json, '"q\\"" "é"'),
+        ("unmoved", {}, str, "unmoved"),
+        ("n1 n1", {"../up": "n1"}, str, "../up ../up"),
+    ],
+)
+def test_names_of_files_are_put_back_as_they_are_written(text, moved, written, found):
+    assert reproduce.restored(text, moved, written) == found
+
+
+@pytest.mark.parametrize(
+    ("unlike", "undetailed", "said"),
+    [
+        ({}, "", "Same machine and versions: compared to the last bit."),
+        ({"numpy": ("1.9", "2.0")}, "", "compared to stated tolerances (numpy was 1.9 and is 2.0)."),
+        ({"a": ("none", "1"), "b": ("2", "none")}, "", "stated tolerances (a was none and is 1; b was 2 and is none)."),
+        (
+            {"a": ("none", "1"), "b": ("2", "none")},
+            "arm64",
+            "(b was 2 and is none; of its machine the report says no more than arm64, as version 0.1.0 wrote it).",
+        ),
+    ],
+)
+def test_the_basis_names_each_thing_that_is_another(unlike, undetailed, said):
+    assert reproduce.basis(outcome(unlike=unlike, undetailed=undetailed)).endswith(said)
+    assert outcome(unlike=unlike).to_the_last_bit is (not unlike)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<p>hello</p>", "is no report of microrad; name a report.html that microrad run wrote"),
+        ("microrad study of x", "carries no manifest: it was cut short, or an earlier version wrote it; name the mani"),
+        (manifest.OPENING * 3 + manifest.ENDING, "carries 3 manifests; a report has one, so this one was put together"),
+        (manifest.OPENING + "{}", "ends within its manifest: it was cut short; name the whole report"),
+        (manifest.OPENING + "{" + manifest.ENDING, "its manifest is no JSON (Expecting property name enclosed in doub"),
+        (manifest.OPENING + "NaN" + manifest.ENDING, "its manifest is no JSON (NaN is no number of JSON); the report"),
+        (manifest.OPENING + "[" * 200_000 + manifest.ENDING, "its manifest is nested too deeply; the report was chang"),
+        (manifest.OPENING + "3" + manifest.ENDING, "no mission with file, sha256, text, text_sha256; no versions as"),
+    ],
+)
+def test_a_page_that_is_none_is_refused_with_its_name_and_reason(tmp_path, text, words):
+    path = tmp_path / "odd.html"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(manifest_reader.ReproduceError, match=re.escape(words)) as caught:
+        manifest_reader.read_manifest(path)
+    assert str(caught.value).startswith(f"{path}: ") and caught.value.page == "report"
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (FileNotFoundError(), "there is no such file; name a report.html or a folder of results"),
+        (IsADirectoryError(), "is a folder without a manifest.json; name a report.html or a folder of results"),
+        (PermissionError(13, "Permission denied"), "cannot be read: Permission denied; name a report.html"),
+        (OSError(5, "Input/output error"), "cannot be read: Input/output error; name a report.html"),
+        (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "bad"), "is no text, so no report of microrad; name a report.html"),
+    ],
+)
+def test_what_goes_wrong_in_reading_is_told_by_its_kind(tmp_path, monkeypatch, error, words):
+    path = tmp_path / "report.html"
+    path.write_text("x", encoding="utf-8")
+
+    def read(path, most):
+        raise error
+
+    monkeypatch.setattr(manifest_reader, "read_bytes", read)
+    with pytest.raises(manifest_reader.ReproduceError) as caught:
+        manifest_reader.read_manifest(path)
+    assert str(caught.value) == f"{path}: {words}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "faults"),
+    [
+        ({"mission": None}, "no mission with file, sha256, text, text_sha256"),
+        ({"mirror": {"file": "m"}}, "no mirror with file, sha256, text, text_sha256"),
+        ({"mirror": None, "machine": "x86_64"}, ""),
+        ({"machine": {"processor": 3}}, "no machine as names with texts"),
+        ({"versions": None}, "no versions as names with texts"),
+        ({"inputs": {"a": 3}}, "no inputs as names with texts"),
+        ({"inputs": {str(k): "" for k in range(17)}}, "more inputs than a mission names"),
+        ({"inputs": {str(k): "" for k in range(16)}}, ""),
+        ({"inputs_sha256": []}, "no inputs_sha256 as names with texts"),
+        ({"files_sha256": {"a": None}}, "no files_sha256 as names with texts"),
+        ({"summary": []}, "no summary, against which a run could be held"),
+        (
+            {"summary": 1, "versions": 2},
+            "no versions as names with texts; no summary, against which a run could be held",
+        ),
+    ],
+)
+def test_each_fault_of_a_manifest_is_named_and_no_other(tmp_path, changes, faults):
+    text = {"file": "m.toml", "sha256": "1", "text": "t", "text_sha256": "2"}
+    data = {"mission": text, "mirror": text, "inputs": {}, "versions": {"python": "3"}, "summary": {}, **changes}
+    path = tmp_path / "m.json"
+    if not faults:
+        manifest_reader._check(path, data)
+        return
+    with pytest.raises(manifest_reader.ReproduceError) as caught:
+        manifest_reader._check(path, data)
+    assert str(caught.value) == f"{path}: its manifest has {faults}: it is none of a study of this version"
+
+
+@pytest.mark.parametrize(
+    ("name", "ending"),
+    [
+        ("a.csv", ".csv"),
+        ("../x.tle", ".tle"),
+        ("a", ""),
+        ("a.", ""),
+        ("a.b.c1", ".c1"),
+        ("a.longending", ""),
+        ("a.x y", ""),
+    ],
+)
+def test_a_file_that_is_renamed_keeps_a_short_ending(name, ending):
+    assert manifest_reader._ending(name) == ending
+
+
+@pytest.mark.parametrize(
+    ("page", "shown"),
+    [
+        (f"a{manifest.OPENING}x{manifest.ENDING}b", "ab"),
+        (f"a{manifest.OPENING}x", "a"),
+        ("a</script>b", "a</script>b"),
+        (f"a</script>{manifest.OPENING}x{manifest.ENDING}b</script>c", "a</script>b</script>c"),
+    ],
+)
+def test_a_page_is_shown_without_its_manifest_and_takes_another(page, shown):
+    assert manifest.shown_part(page) == shown
+    assert manifest.hash_of_page(page) == hashlib.sha256(shown.encode()).hexdigest()
+    if page.count(manifest.ENDING) > page.count("</script>b"):
+        assert manifest.shown_part(manifest.with_manifest(page, "new")) == shown
+
+
+def test_a_manifest_in_a_page_ends_no_element_and_hashes_are_of_utf_8():
+    data = {"a": "</script><b>&", "ä": [1.5, None]}
+    text = manifest.embedded(data)
+    assert not {"<", ">", "&"} & set(text) and json.loads(text) == data and "ä" in text
+    assert manifest.hash_of_summary(data) == hashlib.sha256('{"a":"</script><b>&","ä":[1.5,null]}'.encode()).hexdigest()
+    assert manifest.text_sha256("\ud800") == hashlib.sha256(b"\xed\xa0\x80").hexdigest()
+    with pytest.raises(ValueError, match="JSON"):
+        manifest.embedded({"a": math.nan})
+
+
+def test_a_manifest_is_written_with_the_hash_of_each_file_by_its_place(tmp_path):
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "b.csv").write_bytes(b"1")
+    (tmp_path / "a.html").write_bytes(b"2")
+    manifest.write_manifest({"x": "ä", "files_sha256": {}}, tmp_path, "m.json")
+    text = (tmp_path / "m.json").read_text(encoding="utf-8")
+    assert text.startswith('{\n  "x": "ä",') and text.endswith("}\n")
+    assert json.loads(text)["files_sha256"] == {
+        "a.html": hashlib.sha256(b"2").hexdigest(),
+        "figures/b.csv": hashlib.sha256(b"1").hexdigest(),
+    }
+
+
+@pytest.mark.parametrize(
+    ("drawn", "scan", "said"),
+    [
+        ({}, None, "none"),
+        ({"fine_pointing": (7, 64)}, None, "seed 7 of [fine_pointing], 64 runs"),
+        (
+            {"operations": (3, 40), "acquisition": (5, 1)},
+            None,
+            "seed 5 of [acquisition], 1 runs; seed 3 of [operations], 40",
+        ),
+        (
+            {"acquisition": (5, 9)},
+            1,
+            f"[acquisition], 9 runs; seed {manifest.SEED} of the virtual bench, {manifest.PLAN}",
+        ),
+    ],
+)
+def test_a_manifest_names_each_seed_and_carries_what_was_read(tmp_path, drawn, scan, said):
+    tables = dict.fromkeys(("fine_pointing", "acquisition", "operations"))
+    tables |= {name: SimpleNamespace(seed=seed, runs=runs) for name, (seed, runs) in drawn.items()}
+    contents = [SimpleNamespace(name=n, content=c) for n, c in (("a", b"ab"), ("b", None), ("c", b"\xff"))]
+    mission = {"path": Path("x/m.toml"), "sha256": "1", "text": "t", "mirror_file": None, "contents": contents}
+    run = SimpleNamespace(file=SimpleNamespace(mission=SimpleNamespace(**tables), **mission), scan=scan)
+    (tmp_path / "f").write_bytes(b"f")
+    made = manifest.manifest_of(run, {"a": math.inf}, tmp_path)
+    hashes = {name: hashlib.sha256(text).hexdigest() for name, text in (("a", b"ab"), ("c", b"\xff"), ("f", b"f"))}
+    text = {"file": "m.toml", "sha256": "1", "text_sha256": hashlib.sha256(b"t").hexdigest(), "text": "t"}
+    assert made["randomness"].endswith(said) if scan else made["randomness"].startswith(said)
+    assert {key: made[key] for key in ("mission", "inputs", "mirror", "summary")} == {
+        **{"mission": text, "inputs": {"a": "ab"}, "mirror": None, "summary": {"a": None}},
+    }
+    assert made["inputs_sha256"] == {"a": hashes["a"], "c": hashes["c"]} and made["files_sha256"] == {"f": hashes["f"]}
+    assert made["summary_sha256"] == manifest.hash_of_summary({"a": None})
+    assert (made["versions"], made["machine"]) == (machine.versions(), machine.machine())
+
+
+@pytest.mark.parametrize(
+    ("kind", "resolution", "step"),
+    [
+        ("drive", 0.5, 2e-5 * 0.5),
+        ("sensor", 3e-6, 3e-6),
+        ("fine", 0.25, 5e-6),
+        ("light", 7e-6, 7e-6),
+        ("gauge", 9e-6, 9e-6),
+    ],
+)
+def test_the_step_of_a_mission_is_the_largest_of_its_converters(monkeypatch, kind, resolution, step):
+    at = {"drive": 0.0, "sensor": 0.0, "fine": 0.0, "light": 0.0, "gauge": 0.0, kind: resolution}
+    monkeypatch.setattr(tolerances, "slow_gain", lambda model: -2e-5)
+    control = SimpleNamespace(drive_resolution_v=at["drive"], sensor_resolution_rad=at["sensor"])
+    loop = SimpleNamespace(
+        strain_gauge=SimpleNamespace(resolution_rad=at["gauge"]) if kind == "gauge" else None,
+        drive_resolution_v=at["fine"],
+        optical_sensor=SimpleNamespace(resolution_rad=at["light"]),
+        runs=16,
+    )
+    table = {"control": control, "fine_pointing": loop, "requirement": SimpleNamespace(pointing_error_rad=4e-5)}
+    table |= {"acquisition": SimpleNamespace(runs=500), "operations": SimpleNamespace(runs=30)}
+    table["communication"] = SimpleNamespace(data_rate_bit_s=622.08e6)
+    beam = SimpleNamespace(fall=SimpleNamespace(loss_db=lambda error_rad: (error_rad / 1e-5) ** 2))
+    run = SimpleNamespace(
+        file=SimpleNamespace(mission=SimpleNamespace(**table)),
+        summary=SimpleNamespace(model=None),
+        links=SimpleNamespace(data=SimpleNamespace(beam=beam)),
+        fine_pointing=SimpleNamespace(optimum_rad=1.5e-6, budget=SimpleNamespace(full_rad=8e-6)),
+    )
+    found = tolerances.converter_steps(run)
+    at_limit = (4.0 + 2.0 * step / 1e-5) ** 2 - 16.0, (4.0 + 0.5 * step / 1e-5) ** 2 - 16.0
+    assert (found.step_rad, found.run_db, found.runs_db) == pytest.approx((step, *at_limit))
+    assert (found.run_rad, found.runs_rad) == pytest.approx((2.0 * step, 0.5 * step))
+    assert (found.runs, found.allowed_rad, found.rms_rad, found.full_rad) == (16, 4e-5, 1.5e-6, 8e-6)
+    assert (found.rate_bit_s, found.acquisitions, found.days) == (622.08e6, 500, 30)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "fits"),
+    [
+        *(("a.*", "a.b.c", True), ("a.*", "a", False), ("a[].b", "a[].b", True), ("a[].b", "axb", False)),
+        *(
+            ("{a,b.c}.d", "b.c.d", True),
+            ("{a,b.c}.d", "bxc.d", False),
+            ("a.{x,y}[]", "a.y[]", True),
+            ("a", "aa", False),
+        ),
+    ],
+)
+def test_a_pattern_of_places_has_dots_lists_and_choices(text, place, fits):
+    assert bool(tolerances._pattern(text).fullmatch(place)) is fits

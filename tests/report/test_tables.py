@@ -1,11 +1,17 @@
 """Tables on a terminal: which columns there is room for, and what becomes of the others."""
 
+import math
 import re
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from microrad import report
+from microrad.report.data import fields, finite
 from microrad.report.day.tables import CONTACT_COLUMNS, contacts_table
-from microrad.report.tables import Table, table_text
+from microrad.report.tables import Cell, Table, numbers_text, rows_of, table_text
+from microrad.report.view import Points, Soft, Verdict, View, anchored, opened, slug, told, views_text
 from shipped import plain_study
 
 BRIEF = ("by", "rise", "set", "min", "could carry", "begins and ends by")
@@ -67,3 +73,160 @@ def test_columns_of_words_share_what_is_left_without_breaking_a_word(width):
     text = table_text(table, width)
     assert {*text.split()} >= {"pointing", "error", "from", "independent", "samples", "jitter", "given", "35154"}
     assert max(map(len, text.splitlines())) <= width
+
+
+def wordy_table():
+    rows = [("a", "1", "-22", Cell("w", "FAIL"), "long words here"), ("bb", "", "3", "", Cell("k", code=True))]
+    return Table("T", ("name", "x", "y", "why", "what"), rows, (0, 3, 4), names={1: "n", 2: ("p", "q")}, brief=(4, 0))
+
+
+def test_a_brief_table_has_its_columns_in_the_order_that_it_names():
+    lines = [" what              name", " ──────────────────────", " long words here   a", " k                 bb"]
+    assert [line for line in table_text(wordy_table(), 60).split("\n") if line][1:] == lines
+    assert wordy_table().for_width(60).name(1, 0) == "" and wordy_table().for_width(120).name(1, 2) == "q"
+
+
+def test_columns_that_are_kept_take_their_words_and_names_along():
+    kept = wordy_table().columns((2, 4, 1))
+    assert (list(kept.headings), list(kept.words), dict(kept.names)) == (
+        ["y", "what", "x"],
+        [1],
+        {0: ("p", "q"), 2: "n"},
+    )
+    assert [kept.name(row, column) for row in (0, 1) for column in (0, 1, 2)] == ["p", "", "n", "q", "", "n"]
+    assert [list(map(str, row)) for row in kept.rows] == [["-22", "long words here", "1"], ["3", "k", ""]]
+
+
+@pytest.mark.parametrize(
+    ("width", "widths"),
+    [
+        (60, [4, 1, 3, 6, 15]),
+        (41, [4, 1, 3, 6, 13]),
+        (33, [4, 1, 3, 6, 5]),
+        (32, [4, 1, 3, 5, 5]),
+        (30, [4, 1, 3, 4, 5]),
+    ],
+)
+def test_what_is_left_of_a_line_goes_to_the_column_that_lacks_least(width, widths):
+    assert wordy_table().widths(width) == widths
+
+
+@pytest.mark.parametrize(
+    ("cell", "text"),
+    [(("a", "!"), "a !"), (("", "!"), "!"), (("a",), "a"), (("", ""), ""), (("a", "PASS", "hint"), "a PASS")],
+)
+def test_a_cell_is_its_text_with_its_mark(cell, text):
+    assert str(Cell(*cell)) == text
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows"),
+    [
+        ({}, []),
+        ({"a": np.empty(0)}, []),
+        ({"a": ()}, []),
+        (
+            {"a": np.array([1.0, np.nan, -2.5e-7]), "b": ("x",), "c": np.empty(0)},
+            [("1", "x", ""), ("",) * 3, ("-2.5e-07", "", "")],
+        ),
+        ({"a": ("nan", "%d"), "b": np.array([-0.0, -np.inf])}, [("nan", "-0"), ("%d", "-inf")]),
+        ({"a": np.array([1234.56])}, [("1.23e+03",)]),
+    ],
+)
+def test_columns_of_any_lengths_become_rows_of_text(columns, rows):
+    assert rows_of(columns, 3) == rows
+
+
+@pytest.mark.parametrize(
+    ("columns", "digits", "text"),
+    [
+        ([[1.0, 2.0], [math.nan, -0.5, 3e9]], 4, "1; |2; -0.5|; 3e+09|"),
+        ([[1.0 / 3.0]], 9, "0.333333333|"),
+        ([[], []], 3, ""),
+        ([[math.inf], []], 3, "inf; |"),
+    ],
+)
+def test_numbers_as_one_text_are_parted_as_they_are_told(columns, digits, text):
+    assert numbers_text([np.array(each) for each in columns], digits, "; ", "|") == text
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("One & two", "one-two"),
+        ("  Ä b--C! ", "b-c"),
+        ("§", "part"),
+        ("a_b.c", "a-b-c"),
+        ("M&S 32", "m-s-32"),
+        ("", "part"),
+    ],
+)
+def test_an_anchor_has_small_letters_digits_and_strokes(text, name):
+    assert slug(text) == name
+
+
+def test_anchors_within_anchors_are_apart_from_those_that_others_have():
+    taken = {"a", "b"}
+    outer, other = anchored([View("A", [View("B"), "words", View("a-2")]), View("A", anchor="c")], taken)
+    assert [outer.anchor, *(view.anchor for view in outer.views), other.anchor] == ["a-2", "b-2", "a-2-2", "c"]
+    assert taken == {"a", "b", "a-2", "b-2", "a-2-2", "c"} and outer.blocks[1] == "words"
+
+
+@pytest.mark.parametrize(
+    ("blocks", "kept"),
+    [
+        ((None, "", Points([]), Points(["a"]), "x", Soft("")), (Points(["a"]), "x", Soft(""))),
+        ((), ()),
+        ((View("t"), Verdict("h"), None), (View("t"), Verdict("h"))),
+    ],
+)
+def test_blocks_that_say_nothing_are_left_out(blocks, kept):
+    assert told(*blocks) == kept
+
+
+def test_figures_that_are_not_named_are_folded_under_their_title():
+    one, two = (SimpleNamespace(name=name, title=f"Title {name}") for name in "ab")
+    shown, folded = opened([one, two], ["a", "c"])
+    assert shown is one and folded == View("Title b", [two], "", True, False)
+
+
+def test_a_verdict_holds_its_blocks_and_a_list_within_a_list_of_sentences():
+    inner = Table("", ("a", "b"), [("x", "1")], (0,))
+    blocks = ["One.", Verdict("Head.", ["Below.", inner, Points(["p " * 12])], False), "Two.", "", "Three."]
+    assert views_text(blocks, 20).split("\n") == [
+        *("One.", "", "Head.", "Below.", "", " a   b", " ─────", " x   1", "", "- p p p p p p p p p", "  p p p"),
+        *("", "Two.", "", "Three."),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        ({"a": (1, np.float64("nan"), np.int64(3))}, {"a": [1, None, 3]}),
+        ([math.inf, {"c": np.bool_(True)}, "x"], [None, {"c": True}, "x"]),
+        ({1: -math.inf, "d": {}}, {1: None, "d": {}}),
+        (np.float32(0.5), 0.5),
+    ],
+)
+def test_plain_data_have_none_for_what_is_not_finite(data, found):
+    assert finite(data) == found and type(finite(data)) is type(found)
+
+
+def test_fields_of_a_record_come_in_the_order_that_is_asked_for():
+    assert list(fields(SimpleNamespace(a=1, b=2, c=3), "c", "a").items()) == [("c", 3), ("a", 1)]
+
+
+def test_a_plan_is_written_for_a_spreadsheet_and_as_a_contact_plan(tmp_path, monkeypatch):
+    from microrad.orbit import operations
+
+    monkeypatch.setattr(operations, "csv_text", lambda planned, utc: f"{planned} at {utc} µ")
+    plan = SimpleNamespace(planned="sessions", epoch=SimpleNamespace(utc="noon"), contact_plan=lambda: "a contact é")
+    report.write_plan(plan, tmp_path)
+    found = {path.name: path.read_bytes().decode() for path in tmp_path.iterdir()}
+    assert found == {"sessions.csv": "sessions at noon µ\n", "contact-plan.ionrc": "a contact é\n"}
+
+
+def test_a_name_that_the_report_has_not_is_said_to_be_missing():
+    with pytest.raises(AttributeError, match=r"module 'microrad\.report' has no attribute 'nothing'"):
+        _ = report.nothing
+    assert {name for name in report.__all__ if not callable(getattr(report, name))} == set()

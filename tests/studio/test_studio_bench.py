@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drawn import plot_lines
 from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import STATIC, identify
 from microrad.lab.live_fit import LIVE_FITS, LiveFit, Loop, live_fit_writer, thin_fit
@@ -1343,3 +1344,198 @@ def test_a_controller_is_tuned_anew_once_a_file_that_the_mission_names_is_anothe
         (tmp_path / "shake.csv").write_bytes(content)
         control_model.controller(load_mission(tmp_path / "m.toml"), "PI")
     assert read == [*contents]
+
+
+def drawn_of_the_bench():
+    """Every figure of the pages of mirror and control by its name, from numbers that are all unlike."""
+    values = {"sensitivity": np.array([0.25, 1.5, 1.0]), "loop_gain": np.array([40.0, 2.0, 1e-5])}
+    of, setting = made(limits_v=(-6.0, 7.0), identified_v=(-3.0, 4.0), **values), Setting(0, 1, "", "mV", "urad")
+    both = {WITH: two_axes(), WITHOUT: two_axes(0.5)}
+    answers, (fit, _) = control_view.Answers(both, both, both), fits_of_two()
+    view = View(900, 250.0, (), (10, 500, 899), ((1.0, 2.0, 3.0),), ((7.0, 8.0, 9.0),))
+    return {
+        "sensitivity": control_view.sensitivity_plot(of),
+        "gain": control_view.gain_plot(of),
+        **{name: getattr(control_view, f"{name}_plot")(answers) for name in ("step", "sine", "jitter", "motion")},
+        "drive": control_view.drive_plot(of, both),
+        "loop": mirror_view.loop_plot(fit, 1, "mV"),
+        "residual": mirror_view.residual_plot(fit, 1),
+        "recording": mirror_view.recording_plot(view, setting),
+        "time": mirror_view.time_plot(view, setting),
+    }
+
+
+DRAWN = {
+    "sensitivity": """
+height 316, 237 of it rows
+xaxis: frequency (Hz) log 0 to 2 grid
+yaxis: |S|, error over disturbance log -0.6021 to 0.29 grid
+scatter |S| (keyed): #D55E00 1.73 solid x=1,10,100 y=0.25,1.5,1
+line 1 / modulus margin asked for (0.5) (keyed): #000000 1.73 dash x0=0 x1=1 y0=2 y1=2 above
+line None: #777777 1.33 dot x0=0 x1=1 y0=1 y1=1 above
+line bandwidth 20 Hz (keyed): #009E73 1.73 dashdot x0=20 x1=20 y0=0 y1=1 above
+""",
+    "gain": """
+height 331, 252 of it rows
+xaxis: frequency (Hz) log 0 to 2 grid
+yaxis: |L|, loop gain log -4 to 1.716 grid
+scatter |L| (keyed): #0072B2 1.73 solid x=1,10,100 y=40,2,1e-05
+line None: #777777 1.33 dot x0=0 x1=1 y0=1 y1=1 above
+line crossover 30 Hz (keyed): #009E73 1.73 dashdot x0=30 x1=30 y0=0 y1=1 above
+""",
+    "step": """
+height 316, 237 of it rows
+xaxis: time (ms) linear -0.2 to 4.2 grid
+yaxis: line of sight, axis x (µrad) linear 0.7 to 7.3 grid
+scatter wanted (keyed): #777777 1.73 dot x=0,1,4 y=1,2,3
+scatter with hysteresis (keyed): #D55E00 1.73 solid x=0,1,4 y=4,5,7
+scatter without hysteresis (keyed): #0072B2 1.73 dash x=0,1,4 y=4,5,7
+""",
+    "sine": """
+height 331, 252 of it rows
+xaxis: time (ms) linear -0.2 to 4.2 grid
+yaxis: error, axis x (µrad) linear 10.9 to 13.1 grid
+scatter with hysteresis (keyed): #D55E00 1.73 solid x=0,1,4 y=11,12,13
+scatter without hysteresis (keyed): #0072B2 1.73 dash x=0,1,4 y=11,12,13
+""",
+    "jitter": """
+height 331, 252 of it rows
+xaxis: time (s) linear 0.2373 to 0.5167 grid
+yaxis: error, axis x (µrad) linear 10.9 to 13.1 grid
+scatter with hysteresis (keyed): #D55E00 0.93 solid x=0.25,0.251,0.254 y=11,12,13
+scatter without hysteresis (keyed): #0072B2 0.93 dash x=0.5,0.501,0.504 y=11,12,13
+""",
+    "motion": """
+height 316, 237 of it rows
+xaxis: time (s) linear 0.2373 to 0.5167 grid
+yaxis: angle, axis x (µrad) linear 2.5 to 35.5 grid
+scatter to be followed (keyed): #777777 4 solid x=0.25,0.251,0.254 y=31,32,34
+scatter with hysteresis (keyed): #D55E00 1.73 solid x=0.25,0.251,0.254 y=4,5,7
+scatter without hysteresis (keyed): #0072B2 1.73 dash x=0.5,0.501,0.504 y=4,5,7
+""",
+    "drive": """
+height 301, 222 of it rows
+xaxis: time (ms) linear -0.2 to 4.2 grid
+yaxis: drive from the bias (V) linear -6.65 to 7.65 grid
+scatter with hysteresis (keyed): #D55E00 1.73 solid x=0,1,4 y=0.5,0.6,0.7
+scatter without hysteresis (keyed): #0072B2 1.73 dash x=0,1,4 y=0.5,0.6,0.7
+line range of the identification (keyed): #777777 1.73 dot x0=0 x1=1 y0=-3 y1=-3 above
+line range of the identification: #777777 1.73 dot x0=0 x1=1 y0=4 y1=4 above
+line amplifier's limits (keyed): #000000 1.73 dash x0=0 x1=1 y0=-6 y1=-6 above
+line amplifier's limits: #000000 1.73 dash x0=0 x1=1 y0=7 y1=7 above
+""",
+    "loop": """
+height 331, 252 of it rows
+xaxis: drive (mV) linear 6.95 to 8.05 grid
+yaxis: angle (µrad) linear 8.85 to 12.15 grid
+scatter measured (keyed): #777777 4 solid x=7,8 y=9,10
+scatter one (keyed): #D55E00 1.73 dash x=7,8 y=11,12
+""",
+    "residual": """
+height 331, 252 of it rows
+xaxis: time (s) linear 2.45 to 3.55 grid
+yaxis: residual (µrad) linear -15.35 to 14.35 grid
+scatter measured less model (keyed): #0072B2 1.73 solid x=2.5,3.5 y=13,-14
+rect seen by no fit (keyed): 0 rgba(86,180,233,0.2) x0=3.25 x1=3.5 y0=0 y1=1 below
+""",
+    "recording": """
+height 345, 266 of it rows
+xaxis: drive (mV) linear 0.9 to 3.1 grid
+yaxis: output (µrad) linear 6.9 to 9.1 grid
+scatter measured (keyed): #0072B2 3.33 circle x=1,2,3 y=7,8,9
+""",
+    "time": """
+height 338, 289 of it rows
+xaxis: linear -0.1378 to 3.774 grid
+yaxis: drive (mV) linear 0.9 to 3.1 grid
+xaxis2: time (s) linear -0.1378 to 3.774 grid
+yaxis2: output (µrad) linear 6.9 to 9.1 grid
+scatter drive: #000000 1.73 solid x=0.04,2,3.596 y=1,2,3
+scatter output: #0072B2 1.73 solid x=0.04,2,3.596 y=7,8,9
+""",
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_figure_of_the_bench_is_drawn_with_its_axes_colours_dashes_and_key(name):
+    assert plot_lines(drawn_of_the_bench()[name]) == DRAWN[name].strip().splitlines()
+
+
+# ------------------------------------------------------------------------------------------------------- word for word
+DRIVES = "u drive input command voltage in ch0 v my_volts overdrive_2 U Ch0 set.command"
+OUTPUTS = "y output out angle tilt sensor displacement position angles disp_1 Tilt_x OUT the-sensor"
+NEITHER = "mu inner ch01 via commands yes outer tilted sensors tension"
+
+
+@pytest.mark.parametrize("name", [*DRIVES.split(), *OUTPUTS.split(), *NEITHER.split()])
+def test_a_channel_is_guessed_by_each_word_for_one_and_not_by_a_word_within_another(name):
+    found = mirror_form.first_setting(listed(("a", ""), ("b", ""), (name, "")), "x.csv")
+    guessed = (2, 0) if name in DRIVES.split() else (0, 2) if name in OUTPUTS.split() else (0, 1)
+    assert (found.drive, found.output) == guessed
+
+
+@pytest.mark.parametrize("unit", mirror_form.OUTPUT_UNITS)
+@pytest.mark.parametrize("stated", ["{}", "µ{}"], ids=["plain", "micro"])
+def test_each_unit_of_an_output_is_taken_from_the_file(unit, stated):
+    said = stated.format(unit[1:]) if unit[0] == "u" and stated != "{}" else unit
+    for listing in (listed(("a", "V"), ("b", said)), listed(("a", "V"), (f"b [{said}]", ""))):
+        found = mirror_form.first_setting(listing, "x.csv")
+        assert (found.drive, found.output, found.drive_unit, found.output_unit) == (0, 1, "V", unit)
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        ("play operators", "fitting prandtl_ishlinskii"),
+        ("Bouc-Wen starts", "fitting bouc_wen, start by start"),
+        ("linear part", "linear part"),
+    ],
+)
+def test_each_phase_of_an_identification_has_its_words(tmp_path, what, words):
+    job = Job(1, tmp_path, "running", progress=Progress(3, 7, what))
+    assert mirror_view.doing(what) == words
+    assert mirror_view.state_words(job, None) == f"3 of 7 fits: {words}."
+    assert mirror_view.state_words(replace(job, cancelling=True), None) == f"3 of 7 fits: {words}, stopping."
+
+
+@pytest.mark.parametrize(
+    ("state", "words"),
+    [
+        ("queued", "Waiting for another job to end."),
+        ("running", "Begins."),
+        ("done", "Done."),
+        ("cancelled", "Cancelled; nothing was written."),
+        ("failed", "failed: why."),
+        ("lost", "lost: why."),
+        ("unreadable", "unreadable: why."),
+    ],
+)
+def test_each_state_of_an_identification_has_its_words(tmp_path, state, words):
+    job, lead = Job(1, tmp_path, state, words="why."), "Chosen" if state == "done" else "Best so far"
+    told = f"{words} {lead}: bouc_wen, 0.0123 % rms on samples that no fit has seen."
+    assert mirror_view.state_words(job, None) == words
+    assert mirror_view.state_words(job, LiveFit("bouc_wen", 9.87654, 0.01234, ())) == told
+
+
+OUTSIDE = "is outside 100 mHz to 10 kHz; type one between"
+ASKED = {
+    ("9 urad", "0.1 rad", "0.1 Hz"): control_view.Ask(9e-6, 0.1, 0.1),
+    (" 1 nrad ", " 2 mrad", "3 kHz "): control_view.Ask(1e-9, 2e-3, 3000.0),
+    ("0.5 nrad", "x", "y"): "step: 0.5 nrad is outside 1 nrad to 100 mrad; type one between",
+    ("-1 urad", "x", "y"): "step: -1 urad is outside 1 nrad to 100 mrad; type one between",
+    ("1 urad", "0.2 rad", "y"): "amplitude of the sine: 0.2 rad is outside 1 nrad to 100 mrad; type one between",
+    ("1 urad", "2 urad", "0.05 Hz"): f"frequency of the sine: 0.05 Hz {OUTSIDE}",
+    ("1 urad", "2 urad", "12 kHz"): f"frequency of the sine: 12 kHz {OUTSIDE}",
+    ("1 urad", "2 urad", "4 kHz"): "frequency of the sine: 4 kHz is not below 4 kHz, half the rate of the loop, 8 kHz, "
+    "which would take it for a slower one; type one below",
+}
+
+
+@pytest.mark.parametrize("typed", ASKED)
+def test_what_is_asked_of_a_loop_is_taken_or_refused_by_its_field(typed):
+    if isinstance(ASKED[typed], control_view.Ask):
+        assert control_view.ask_of(*typed, 8000.0) == ASKED[typed]
+        return
+    with pytest.raises(control_view.AskError) as refusal:
+        control_view.ask_of(*typed, 8000.0)
+    assert str(refusal.value) == ASKED[typed]

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drawn import block_lines, plot_lines
 from link_files import FADING, RECEIVERS, data_with, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
@@ -1130,3 +1131,238 @@ def test_a_question_whose_work_fails_in_another_way_ends_all_the_same(monkeypatc
     latest.ask("a", fails)
     state = latest.wait(HANG_S)
     assert (state.running, state.error, seen) == (False, words, told)
+
+
+DRAWN = {
+    "margin map": """
+height 424, 375 of it rows
+xaxis: data rate (Mbit/s) log 1 to 4 bare
+yaxis: pointing error (µrad) linear 0 to 21.9 bare
+heatmap : x=65:10..96.466..10000 y=61:0..7.3..21.9 z=3965:20.44..9.4..-20.26
+scatter 0 dB: #ffffff 2 dash x=61:1105.5..840.83..94.18 y=61:0..7.3..21.9
+scatter 1.7 dB: #ffffff 2.93 solid x=61:747.4..568.47..63.673 y=61:0..7.3..21.9
+scatter working point: #D55E00 13.33 circle x=622.08 y=7.3
+""",
+    "lines": """
+height 296, 217 of it rows
+xaxis: angle (µrad) linear 0 to 447.5 grid
+yaxis: linear 9.6 to -0.6 bare Body pointing, Orbit knowledge, Misalignment, Point-ahead, root sum square, class \
+by class, ECSS, one axis, ECSS, two axes, ECSS, two like axes, radial distribution
+bar random (keyed): #E69F00 x=300 y=0 base=0
+bar drift (keyed): #009E73 x=24 y=1 base=0
+bar bias (keyed): #0072B2 x=100,21 y=2,3 base=0,0
+bar total (keyed): #777777 x=317.83,426.18,280.63,396.87,204.42,316.15 y=4,5,6,7,8,9 base=0,0,0,0,0,0
+line beacon's half angle: 406 µrad (keyed): #D55E00 2 dash x0=406 x1=406 y0=0 y1=1 above
+""",
+    "coverage": """
+height 286, 207 of it rows
+xaxis: angle off the line of sight (µrad) linear 0 to 507.5 grid
+yaxis: probability of an error below it (%) linear 0 to 101 grid
+scatter inside this angle (keyed): #0072B2 2.53 solid x=241:0..169.17..507.5 y=241:0..34.078..99.907
+line beacon's half angle: 406 µrad (keyed): #D55E00 2 solid x0=406 x1=406 y0=0 y1=1 above
+line root sum square: 318 µrad (keyed): #E69F00 2 dash x0=317.83 x1=317.83 y0=0 y1=1 above
+line ECSS, two axes: 397 µrad (keyed): #009E73 2 dashdot x0=396.87 x1=396.87 y0=0 y1=1 above
+line 87.5 % inside: 316 µrad (keyed): #000000 2 dot x0=316.15 x1=316.15 y0=0 y1=1 above
+""",
+    "coverage without a beacon": """
+height 301, 222 of it rows
+xaxis: angle off the line of sight (µrad) linear 0 to 496.1 grid
+yaxis: probability of an error below it (%) linear 0 to 101 grid
+scatter inside this angle (keyed): #0072B2 2.53 solid x=241:0..165.36..496.09 y=241:0..32.547..99.863
+line root sum square: 318 µrad (keyed): #E69F00 2 dash x0=317.83 x1=317.83 y0=0 y1=1 above
+line ECSS, two axes: 397 µrad (keyed): #009E73 2 dashdot x0=396.87 x1=396.87 y0=0 y1=1 above
+line 87.5 % inside: 316 µrad (keyed): #000000 2 dot x0=316.15 x1=316.15 y0=0 y1=1 above
+""",
+}
+
+
+@pytest.mark.parametrize("name", ["margin map", "lines", "coverage", "coverage without a beacon"])
+def test_a_figure_of_the_links_is_drawn_with_its_axes_colours_dashes_and_key(draft, name):
+    if name == "margin map":
+        figure = link_view.map_plot(link_view.view(unlike(draft).link()))
+    else:
+        changes = {"pointing.confidence": "0.875", "beacon.divergence": "812 urad", "point_ahead.error": "21 urad"}
+        found = pointing_view.view(unlike(draft, **changes).link())
+        if name.endswith("without a beacon"):
+            found = replace(found, budget=replace(found.budget, reading=None))
+        figure = (pointing_view.lines_plot if name == "lines" else pointing_view.coverage_plot)(found)
+    assert plot_lines(figure) == DRAWN[name].strip().splitlines()
+
+
+SELDOM = """terminals.leo_obscuration beacon.wavefront_error requirement.outage answer.strehl beacon.wavelength
+communication.transmit_optics_loss answer.receive_optics_loss communication.implementation_loss"""
+OFTEN = """beacon.divergence answer.transmit_power terminals.geo_aperture communication.data_rate requirement.margin
+beacon.distance communication.receiver_sensitivity answer.pointing_error beacon.required_power"""
+
+
+@pytest.mark.parametrize("key", [*SELDOM.split(), *OFTEN.split()])
+def test_each_number_of_the_links_stands_in_front_or_behind(key):
+    assert link_view.second(key) is (key in SELDOM.split())
+
+
+@pytest.mark.parametrize(
+    ("table", "group"),
+    [
+        *(("terminals", "Telescopes"), ("communication", "Communication"), ("beacon", "Beacon"), ("answer", "Answer")),
+        ("requirement", "Required"),
+    ],
+)
+def test_the_sliders_of_a_table_stand_under_its_name_in_the_order_of_the_text(draft, table, group):
+    groups = link_view.sliders(draft)
+    assert [*groups] == ["Telescopes", "Communication", "Beacon", "Answer", "Required"]
+    numbers = [key for key, each in draft.values.items() if key.startswith(f"{table}.") and key.count(".") == 1]
+    numbers = [key for key in numbers if draft.values[key].about.kind in ("quantity", "number")]
+    assert [each.key for each in groups[group]] == numbers != []
+
+
+PARTS = {
+    "links": """
+Not every requirement is met: communication margin; communication +1.31 dB, beacon +4.36 dB, answer
+Table The answer's light on the tracking sensor (The answer's light on the tracking sensor: noise-eq
+Points
+Figure What moves the margin
+View What moves the margin of the beacon (folded)
+  Figure What moves the margin of the beacon
+View What moves the margin of the answer (folded)
+  Figure What moves the margin of the answer
+View Acquisition
+  Exact sums over all orders of failures beside a seeded simulation of the same process. The wide be
+  The scan covers 491 µrad about the predicted direction, for an uncertainty of 151 µrad rms per axi
+  Table
+  View Stages of the wide beacon, and one simulated run (folded)
+    Table
+    Table One simulated run
+  View Stages of the spiral scan, and one simulated run (folded)
+    Table
+    Table One simulated run
+  View Wide beacon or scan (folded)
+    Figure Wide beacon or scan
+View SDA Optical Communications Terminal (OCT) Standard (folded)
+  Of 17 requirements that public sources print of it, up to version 4.0.0 (July 2024), 6 are met and
+  Table
+  Soft Read from what public sources print of versions 3.0 to 4.0.0 and not from the standard itself
+""",
+    "pointing": """
+Table
+Soft Largest allowed: the half width at which the root sum square, or the total of ECSS for two axes
+Table  (Totals at 87.5 %: root sum square 318 µrad; class by class 426 µrad; ECSS, one axis 281 µrad
+Read as full-1/e2, the beacon's half angle is 390 µrad, at least the root sum square of one axis. It
+View Point-ahead
+  Point-ahead: up to 71 µrad, 3.6 half angles of the communication beam; left out, it would cost mor
+""",
+    "pointing without beacon and point-ahead": """
+The mission has no beacon, so nothing is to be covered.
+Table
+Table  (Totals at 87.5 %: root sum square 318 µrad; class by class 426 µrad; ECSS, one axis 281 µrad
+View Point-ahead
+  Soft The mission has no table [point_ahead].
+""",
+    "day": """
+In 24 h the relay is in view 15 times, 913 min in all, and could carry 2.05 TB. The ground (kiruna)
+The relay is in view for 63.4 % of the time, 54.7 min at a time (median), and out of it for 41 min a
+With a pointing loss of 2.23 dB (communication.pointing_error, 10 µrad) the laser link has the deman
+What becomes of the 32.4 GB that the instrument makes: by the relay half arrives within 1 s, and 99
+What matters most to the ratio of the two volumes, each assumption changed alone: laser data rate (1
+How late data arrive depends most on laser data rate: with 150 Mbit/s or 600 Mbit/s, 99 % arrive wit
+Warnings:
+Points
+Table Relay and direct downlink (What the ways could carry: 2.05 TB by relay and 54.2 GB by direct d
+Table Contacts (Every contact)
+Table One assumption changed (One assumption changed, all others as they are)
+Figure Contacts over time
+View Along contact 1 (folded)
+  Figure Along contact 1
+Figure Data generated, delivered and stored
+View From recording to delivery (folded)
+  Figure From recording to delivery
+View Ground track, relays and stations (folded)
+  Figure Ground track, relays and stations
+View What the assumptions decide (folded)
+  Figure What the assumptions decide
+""",
+}
+
+
+def parts_of(draft, name):
+    """The blocks of a page of the design, but for what tables and lists hold."""
+    if name == "links":
+        blocks = link_view.blocks(link_study.run_link_study(unlike(draft).link()))
+    else:
+        found = pointing_view.view(
+            unlike(draft, **{"pointing.confidence": "0.875", "point_ahead.error": "21 urad"}).link()
+        )
+        if name == "pointing without beacon and point-ahead":
+            found = replace(found, ahead=None, budget=replace(found.budget, reading=None))
+        blocks = pointing_view.blocks(found)
+    return [line for line in block_lines(blocks) if not line.lstrip().startswith(("|", "-"))]
+
+
+@pytest.mark.parametrize("name", ["links", "pointing", "pointing without beacon and point-ahead"])
+def test_a_page_of_the_design_has_its_parts_in_their_order(draft, name):
+    assert [line[:100].rstrip() for line in parts_of(draft, name)] == PARTS[name].strip().splitlines()
+
+
+def test_the_day_has_its_parts_in_their_order_and_its_map_as_a_picture(day):
+    lines = [line for line in block_lines(day_view.blocks(day)) if not line.lstrip().startswith(("|", "-"))]
+    assert [line[:100].rstrip() for line in lines] == PARTS["day"].strip().splitlines()
+
+
+@pytest.mark.parametrize("keyed", [False, True])
+def test_a_figure_has_the_margins_of_its_widest_panels_and_the_places_of_each(monkeypatch, keyed):
+    panels = [
+        {"x": "xaxis", "y": "yaxis", "inner": [11, 22, 90, 60], "outer": [1, 2, 103, 74]},
+        {"x": "xaxis2", "y": "yaxis2", "inner": [120, 20, 195, 61], "outer": [103, 5, 210, 77]},
+    ]
+    layout = {name: {} for name in ("xaxis", "yaxis", "xaxis2", "yaxis2")} | {"shapes": [{"type": "rect"}]}
+    entries = [
+        {"label": "one & <two>", "data": [0, 1], "shapes": [0], "line": {}},
+        {"label": "alone", "data": [], "shapes": [], "line": {"color": "red"}},
+    ]
+    keys = [{"entries": entries}] * keyed
+    made = {"data": [{"y": [1]}, {"y": [2]}, {"y": [3]}], "layout": layout, "panels": panels, "keys": keys}
+    monkeypatch.setattr(plots, "plot_of", lambda sheet: made)
+    found = plots.figure(Sheet(1.0, 1.0))
+    assert found["rows"] == 41
+    assert found["layout"]["height"] == 41 + 20 + 16 + 30 * keyed
+    assert found["layout"]["margin"] == {"l": 17, "t": 20, "r": 15, "b": 16}
+    domains = {name: found["layout"][name]["domain"] for name in ("xaxis", "yaxis", "xaxis2", "yaxis2")}
+    assert domains == {
+        **{"xaxis": pytest.approx([0.0, 79 / 184]), "yaxis": pytest.approx([1 / 41, 39 / 41])},
+        **{"xaxis2": pytest.approx([109 / 184, 1.0]), "yaxis2": pytest.approx([0.0, 1.0])},
+    }
+    assert [found["layout"][name].get("automargin") for name in domains] == [None, True, None, True]
+    assert found["layout"]["legend"] == {
+        "orientation": "h",
+        "y": 1.02,
+        "yanchor": "bottom",
+        "x": 0.0,
+        "font": {"size": 12},
+    }
+    assert (found["layout"]["paper_bgcolor"], found["layout"]["plot_bgcolor"]) == ("white", "white")
+    assert found["layout"]["showlegend"] is True
+    told = [(each.get("name"), each["showlegend"]) for each in found["data"]]
+    label = "one &amp; &lt;two&gt;"
+    assert told == ([(label, True), (label, False), (None, False), ("alone", True)] if keyed else [(None, False)] * 3)
+    if keyed:
+        assert found["data"][3]["line"] == {"color": "red"} and found["data"][3]["x"] == [None]
+        assert found["layout"]["shapes"] == [{"type": "rect", "name": label, "legendgroup": label, "showlegend": False}]
+
+
+def test_a_figure_that_shows_nothing_says_why_in_its_middle():
+    note = {"text": "none &amp; &lt;no&gt;", "xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False}
+    found = plots.empty("none & <no>")
+    assert (found["data"], [*found]) == ([], ["data", "layout", "config"])
+    assert found["layout"] == {
+        **{"paper_bgcolor": "white", "plot_bgcolor": "white", "margin": {"l": 10, "r": 10, "t": 10, "b": 10}},
+        **{"xaxis": {"visible": False}, "yaxis": {"visible": False}, "annotations": [note]},
+    }
+    less = ["lasso2d", "select2d", "autoScale2d"]
+    assert found["config"] == {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": less}
+
+
+@pytest.mark.parametrize(
+    ("svg", "address"),
+    [("<svg/>", "PHN2Zy8+"), ("<svg>é</svg>", "PHN2Zz7DqTwvc3ZnPg=="), ("", "")],
+)
+def test_a_picture_is_the_address_of_an_image(svg, address):
+    assert plots.address(svg) == f"data:image/svg+xml;base64,{address}"

@@ -12,7 +12,7 @@ import pytest
 from microrad.mission.file import MissionError, load_mission
 from microrad.mission.model import Mission
 from microrad.mission.presets import preset_text
-from microrad.mission.toml import Fault, value_of
+from microrad.mission.toml import Fault, scan, value_of
 from microrad.studio.draft import draft as drafts
 from microrad.studio.draft import tables
 from microrad.studio.draft.draft import Draft, DraftError
@@ -912,3 +912,56 @@ def test_a_key_has_each_of_its_faults(tmp_path):
     one, two, other = (Fault(key, "1", 2, reason, "") for key, reason in (("a.b", "x"), ("a.b", "y"), ("a.c", "z")))
     found = drafts._values("[a]\nb = 1\nc = 2\nd = 3\n", (one, other, two))
     assert {key: value.problems for key, value in found.items()} == {"a.b": (one, two), "a.c": (other,), "a.d": ()}
+
+
+EXAMPLES = """
+channel | zenith_transmission = 0.9; elevation = 30 deg
+channel.turbulence | # Needs a station among the orbits, or channel.station and channel.height. Without it the air \
+is still. | ground_strength = 1.7e-14; wind_rms = 21 m/s; fades = gamma-gamma; wander = dios-2004; tilt = zernike; \
+corrected_modes = 0
+jitter | # What fine pointing leaves, for a link that is budgeted without a simulated loop. | bias = 1 urad, 0 \
+urad; rms = 2 urad, 2 urad; bandwidth = 50 Hz
+communication.beam | # Needs conventions.pointing_loss = "pattern". Without this table the aperture is lit evenly. \
+| profile = gaussian; radius = 2 cm; m_squared = 1.1
+communication.receiver | # In place of communication.receiver_sensitivity, and of implementation_loss where that \
+holds what is said here. | modulation = ook; detector = preamplified; bit_error_ratio = 1e-9; code_gain = 0 dB; \
+code_rate = 1.0; bandwidth = 5 GHz; extinction_ratio = 20 dB; noise_figure = 4 dB; amplifier_gain = 35 dB; \
+optical_bandwidth = 12.5 GHz
+mirror.creep | # What the mirror goes on moving after a step, as parts with a time constant each. | time_constants \
+= 5 s; weights = 1 urad/V
+mirror.prandtl_ishlinskii | # In place of mirror.bouc_wen: hysteresis as a sum of play operators. | thresholds = 0 \
+V, 1 V, 2 V, 4 V; weights = 60 urad/V, 10 urad/V, 8 urad/V, 6 urad/V
+operations.optical | # An optical downlink to ground stations under clouds, beside the relay and the radio. | \
+data_rate = 10 Gbit/s; setup = 60 s; delay = 1 s; weather = 6 h; correlation_length = 500 km
+operations.optical.stations.tenerife | latitude = 28.30 deg; longitude = -16.51 deg; height = 2390 m; mask = 20 \
+deg; availability = 0.7
+operations.optical.stations.nemea | latitude = 37.85 deg; longitude = 22.62 deg; height = 300 m; mask = 20 deg; \
+availability = 0.4, 0.4, 0.5, 0.5, 0.6, 0.8, 0.9, 0.9, 0.7, 0.6, 0.5, 0.4
+constellation.stations.svalbard | # A ground station that the constellation shares beside its relays. | latitude = \
+78.23 deg; longitude = 15.39 deg; height = 480 m; mask = 10 deg; data_rate = 1 Gbit/s; terminals = 2; availability \
+= 0.6
+"""
+
+
+@pytest.mark.parametrize("example", EXAMPLES.strip().splitlines(), ids=lambda line: line.partition(" ")[0])
+def test_an_optional_table_comes_with_its_values_and_says_that_they_are_examples(example):
+    name, *remark, values = example.split(" | ")
+    text = tables._examples()[name]
+    text = text if "stations." in name else text.partition(f"\n\n[{name}.stations.")[0]
+    found = [each for each in scan(text) if each.kind == "key"]
+    assert "; ".join(f"{each.key[len(name) + 1 :]} = {typed_from(each.value)}" for each in found) == values
+    assert text.splitlines()[: len(remark)] == remark
+    assert all(each.comment.startswith("example: ") for each in found)
+
+
+OUTERMOST = """pointing point_ahead terminals conventions beacon answer communication requirement acquisition orbit
+operations constellation mirror amplifier control scenario fine_pointing channel jitter"""
+INNER = """operations.downlink operations.contact mirror.linear mirror.bouc_wen channel.turbulence mirror.creep
+mirror.prandtl_ishlinskii operations.optical mirror.comparison.bouc_wen operations.downlink.stations.kiruna
+operations.optical.stations.tenerife operations.optical.stations.nemea"""
+
+
+def test_examples_are_offered_in_the_order_of_the_shipped_mission_the_outermost_first():
+    names = [*tables._examples()]
+    assert [name for name in names if "." not in name] == OUTERMOST.split()
+    assert [name for name in names if name.startswith(("channel.", "mirror.", "operations."))] == INNER.split()

@@ -1172,3 +1172,81 @@ def test_several_names_that_are_none_are_all_told():
     assert address.hosts(8080, ("h" * 253,)) == (f"{'h' * 253}:8080",)
     assert address.cookie_name("[::1]:8123") == "microrad_studio_8123"
     assert address.cookie_name("[::1]") == address.cookie_name("80.example") == "microrad_studio_80"
+
+
+# ------------------------------------------------------------------------------------------------------- whole answers
+def test_the_settings_of_the_server_are_those_of_the_guard():
+    assert address.server_settings() == {
+        **{"http": "h11", "h11_max_incomplete_event_size": 65_536, "ws": "websockets-sansio", "ws_max_size": 1_000_000},
+        **{"ws_per_message_deflate": False, "proxy_headers": False, "server_header": False, "access_log": False},
+    }
+
+
+def test_each_policy_is_whole():
+    assert policy.page_policy("lab:81", "N0nce") == (
+        "default-src 'none'; script-src 'self' 'nonce-N0nce' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+        "img-src 'self' data: blob:; font-src 'self'; connect-src 'self' ws://lab:81; frame-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    assert policy.refusal_policy() == (
+        "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
+WAY_BACK = '<p>Did this browser have the studio open already? <a href="/">Then go on here.</a></p>'
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_page_of_the_guard_is_whole_with_its_headers(again):
+    sent, kind = [], "websocket.http.response"
+
+    async def send(message):
+        sent.append(message)
+
+    answer = answers.Answer(418, "A <pot>", 'Tea & "more".', ((b"x-own", b"1"),), again)
+    with ThreadPoolExecutor(1) as thread:  # a browser's loop may run in this one
+        thread.submit(asyncio.run, answers.send_answer(answer, {"method": "GET"}, send, kind)).result()
+    start, body = sent
+    text = body["body"].decode("utf-8")
+    head, _, main = text.partition("<body>")
+    assert main == (
+        "<main><h1>A &lt;pot&gt;</h1><p>Tea &amp; &quot;more&quot;.</p>" + WAY_BACK * again + "</main></body></html>\n"
+    )
+    assert head.startswith('<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" ')
+    assert "<title>A &lt;pot&gt; - microrad studio</title>" in head and "body { font: 1rem/1.5 system-ui" in head
+    assert (start["type"], body["type"]) == ("websocket.http.response.start", "websocket.http.response.body")
+    assert (start["status"], start["headers"][:4]) == (
+        418,
+        [
+            *((b"content-type", b"text/html; charset=utf-8"), (b"content-length", str(len(body["body"])).encode())),
+            *((b"cache-control", b"no-store"), (b"x-own", b"1")),
+        ],
+    )
+
+
+@pytest.mark.parametrize(
+    ("host", "name"),
+    [("127.0.0.1:8080", "8080"), ("[::1]:81", "81"), ("lab", "80"), ("[::1]", "80"), ("lab:0", "0")],
+)
+def test_a_cookie_and_an_entrance_are_those_of_their_port(host, name):
+    assert address.cookie_name(host) == f"microrad_studio_{name}"
+    assert address.entrance(host, "t0ken") == f"http://{host}/?token=t0ken"
+
+
+@pytest.mark.parametrize(
+    ("path", "large"),
+    [
+        ("/_nicegui/client/0a-f/upload/7", True),
+        ("/_nicegui/client/0a-f/upload/", False),
+        ("/_nicegui/client/0a-f/upload/1234567890", False),
+        ("/_nicegui/client/0A/upload/7", False),
+        ("/_nicegui/client//upload/7", False),
+        ("/_nicegui/client/0a/upload/7/", False),
+        ("/x/_nicegui/client/0a/upload/7", False),
+        ("/_nicegui/client/0a/download/7", False),
+    ],
+)
+def test_only_the_address_of_an_upload_takes_a_large_body(path, large):
+    assert Limits().of(path) == (200_065_536 if large else 1_000_000)
+    assert Limits(7, 11, "/x").of("/x") == 65_547
+    assert Limits(7, 11, "/x").of("/xy") == 7

@@ -1169,3 +1169,20 @@ def test_the_process_of_a_job_is_started_beside_it_and_apart_from_this_one(waiti
 def test_the_program_of_a_job_is_told_who_watches_over_it():
     own = (sys.executable, "-P", "-m", "microrad.studio.jobs.command", str(os.getpid()))
     assert jobs_process._program() == own
+
+
+@pytest.mark.parametrize(
+    ("state", "finished"),
+    [
+        *(("queued", False), ("running", False), ("done", True), ("failed", True)),
+        *(("cancelled", True), ("lost", True), ("unreadable", True)),
+    ],
+)
+def test_a_job_is_finished_in_each_state_that_nothing_leads_out_of(tmp_path, state, finished):
+    assert jobs_files.Job(1, tmp_path, state).finished is finished
+
+
+def test_a_command_has_half_a_minute_behind_each_signal_and_a_queue_the_time_of_a_start():
+    assert (jobs_process.WAITS_S, jobs_process.QUEUE_S, jobs_process._START_S) == ((30.0, 30.0), 360.0, 300.0)
+    assert (jobs_process._LOOK_S, jobs_process._NICENESS) == (0.2, 5)
+    assert jobs_files.KINDS == ("study", "campaign", "identification", "export")

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +32,7 @@ from nicegui.page import page as at
 
 from microrad.studio.pages import compare, layout, mission, mission_form, runs, runs_jobs
 from microrad.studio.pages.sliders import SliderPage
-from studio_pages import buttons, here, texts
+from studio_pages import buttons, here, outline, press, texts
 from waiting import until
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
@@ -968,3 +969,373 @@ def test_bad_news_is_red_and_good_news_green(session, monkeypatch):
     (colours,) = given
     parts = {name: [int(colour[k : k + 2], 16) for k in (1, 3, 5)] for name, colour in colours.items()}
     assert {name: part.index(max(part)) for name, part in parts.items()} == {"primary": 2, "negative": 0, "positive": 1}
+
+
+# ---------------------------------------------------------------------------------------------- what stands in its rows
+MADE_UP = """
+[conventions]
+pointing_loss = "gaussian"            # assumption: of the two readings
+strehl = "db"
+
+[answer]
+pointing_error = "300 urad"
+colour = "red"                        # paper: nobody knows
+
+[fine_pointing]
+seed = 7
+
+[requirement]
+margin = "3 dB"
+
+[jitter]
+bias = ["1 urad", "-2.5 urad"]        # paper: Table 4
+"""
+
+
+def rows_of(table):
+    def build(session, page):
+        page.form.show(table)
+        return page.form._place
+
+    return build
+
+
+def keys_with(sought):
+    def build(session, page):
+        page.form.show("answer", sought)
+        return page.form._place
+
+    return build
+
+
+def listed_tables(session, page):
+    page.list.clear()
+    page.entries = {}
+    page._list()
+    page._show("answer")
+    return page.list
+
+
+def dialog_of(name):
+    def build(session, page):
+        session.edit(lambda draft: draft.with_text(draft.text.replace("seed = 7", "seed = 8")))
+        with ui.column() as place:
+            getattr(mission, name)(session, print)
+        return next(each for each in place.client.elements.values() if isinstance(each, ui.dialog))
+
+    return build
+
+
+PARTS = {
+    **{f"rows of {table}": rows_of(table) for table in ("conventions", "answer", "jitter", "none")},
+    **{f"keys with {sought}": keys_with(sought) for sought in ("paper: TA", "nothing")},
+    "tables": listed_tables,
+    **{name: dialog_of(name) for name in ("_open", "_save_as", "_revert", "_add_table")},
+}
+STANDS = {
+    "rows of conventions": """
+h2 [conventions]
+div.mission-row
+  label.mission-key[for=key-0]
+    span.mission-name pointing_loss
+  select.mission-field[dense|outlined|options-dense|for=key-0] = gaussian of gaussian, gain, pattern
+  div.mission-note[id=note-0] gaussian: beam with 1/e2 radius D/2 at the aperture; gain: exp(-G theta^2); pattern: \
+the far field of communication.beam / assumption: of the two readings
+  div.mission-drop
+div.mission-row
+  label.mission-key[for=key-1]
+    span.mission-name strehl
+  select.mission-field[dense|outlined|options-dense|for=key-1|error] = db of decibel, ratio, unused, db
+  div.mission-note.wrong[id=note-1] is none of the choices; expected: strehl = "decibel" or strehl = "ratio" or \
+strehl = "unused"
+  div.mission-drop
+    q-btn[aria-label=Remove conventions.strehl|dense|flat|round|icon=close]
+    q-tooltip Remove this line
+div.mission-more
+  select.mission-choice[label=Another key|dense|outlined] of conventions.divergence, conventions.residual \
+(needed), conventions.mirror_angle (needed)
+  q-btn[outline|no-caps] Add
+  div.soft.small.mission-about
+""",
+    "rows of answer": """
+h2 [answer]
+div.mission-row
+  label.mission-key[for=key-0]
+    span.mission-name pointing_error
+    span such as 5 urad
+  input.mission-field[dense|outlined|debounce=150|spellcheck=false|for=key-0] = 300 urad
+  div.mission-note[id=note-0] off the line of sight, radial; an angle with its unit, at least 0 rad, at most 1.571 rad
+  div.mission-drop
+div.mission-row
+  label.mission-key[for=key-1]
+    span.mission-name colour
+  input.mission-field[dense|outlined|debounce=150|spellcheck=false|for=key-1|error] = red
+  div.mission-note.wrong[id=note-1] is no key of [answer]; expected: one of transmit_power, wavelength, strehl, \
+wavefront_error, pointing_error, distance, transmit_optics_loss, receive_optics_loss, divergence, required_power
+  div.mission-drop
+    q-btn[aria-label=Remove answer.colour|dense|flat|round|icon=close]
+    q-tooltip Remove this line
+div.mission-more
+  select.mission-choice[label=Another key|dense|outlined] of answer.transmit_power (needed), answer.wavelength \
+(needed), answer.strehl, answer.wavefront_error, answer.distance, answer.transmit_optics_loss (needed), \
+answer.receive_optics_loss (needed), answer.divergence (needed), answer.required_power (needed)
+  q-btn[outline|no-caps] Add
+  div.soft.small.mission-about
+""",
+    "rows of jitter": """
+h2 [jitter]
+div.mission-row.wide
+  label.mission-key[for=key-0]
+    span.mission-name bias
+    span such as 5 urad
+  input.mission-field[dense|outlined|debounce=150|spellcheck=false|for=key-0] = 1 urad, -2.5 urad
+  div.mission-note[id=note-0] static, about x and y; a list, each item an angle with its unit, at least -1.571 \
+rad, at most 1.571 rad / paper: Table 4
+  div.mission-drop
+div.mission-more
+  select.mission-choice[label=Another key|dense|outlined] of jitter.rms (needed), jitter.bandwidth (needed)
+  q-btn[outline|no-caps] Add
+  div.soft.small.mission-about
+""",
+    "rows of none": """
+div This table has no keys of its own.
+""",
+    "keys with paper: TA": """
+h2 [jitter]
+div.mission-row.wide
+  label.mission-key[for=key-0]
+    span.mission-name bias
+    span such as 5 urad
+  input.mission-field[dense|outlined|debounce=150|spellcheck=false|for=key-0] = 1 urad, -2.5 urad
+  div.mission-note[id=note-0] static, about x and y; a list, each item an angle with its unit, at least -1.571 \
+rad, at most 1.571 rad / paper: Table 4
+  div.mission-drop
+""",
+    "keys with nothing": """
+div No key has this text.
+""",
+    "tables": """
+q-btn.mission-entry[flat|no-caps|align=left]
+  span conventions
+  span.mission-badge 3
+q-btn.mission-entry[aria-current=true|flat|no-caps|align=left]
+  span answer
+  span.mission-badge 8
+q-btn.mission-entry[flat|no-caps|align=left]
+  span fine_pointing
+  span.mission-badge 16
+q-btn.mission-entry[flat|no-caps|align=left]
+  span requirement
+  span.mission-badge 3
+q-btn.mission-entry[flat|no-caps|align=left]
+  span jitter
+  span.mission-badge 2
+q-btn.mission-entry[flat|no-caps|align=left]
+  span general
+  span.mission-badge 9
+""",
+    "_open": """
+q-card.mission-dialog
+  h2 Open a mission in FOLDER
+  select[label=File|outlined] = leo-geo.toml of leo-geo.toml
+  div Changes that are not saved will be lost.
+  div.no.kept[role=alert]
+  div
+    q-btn[no-caps] Open
+    q-btn[outline|no-caps] Cancel
+""",
+    "_save_as": """
+q-card.mission-dialog
+  h2 Save the mission in FOLDER
+  input[label=Name of the file|outlined] = leo-geo.toml
+  div.no.kept[role=alert]
+  div
+    q-btn[no-caps] Save
+    q-btn[outline|no-caps] Cancel
+""",
+    "_revert": """
+q-card.mission-dialog
+  h2 Open leo-geo.toml again and lose the changes?
+  div.no.kept[role=alert]
+  div
+    q-btn[no-caps] Lose the changes
+    q-btn[outline|no-caps] Cancel
+""",
+    "_add_table": """
+q-card.mission-dialog
+  h2 Add a table, with example values to be changed
+  select[label=Table|outlined] = [pointing] of [pointing], [point_ahead], [terminals], [beacon], [communication], \
+[acquisition], [orbit], [operations], [constellation], [mirror], [amplifier], [control], [scenario], [channel], \
+[fine_pointing.geometry], [fine_pointing.vibration], [fine_pointing.body], [fine_pointing.optical_sensor], \
+[fine_pointing.strain_gauge], [fine_pointing.reference], [fine_pointing.wheels], [fine_pointing.misalignment], \
+[fine_pointing.optical_sensor.quad_cell]
+  div.no.kept[role=alert]
+  div
+    q-btn[no-caps] Add
+    q-btn[outline|no-caps] Cancel
+""",
+}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_a_part_of_the_mission_is_built_of_all_that_belongs_to_it(session, opened, name):
+    session.draft.path.write_text(MADE_UP, "utf-8")
+    session.reopen()
+    page = opened()
+    with page.list.client:
+        part = PARTS[name](session, page)
+    found = [line.rstrip().replace(str(session.folder), "FOLDER") for line in outline(part)]
+    assert found == STANDS[name].strip().splitlines()
+
+
+def test_each_button_about_files_opens_its_own_dialog(session, tab, monkeypatch):
+    asked = []
+    for name in ("_open", "_new", "_save_as", "_revert", "_add_table"):
+        monkeypatch.setattr(mission, name, lambda of, shown, name=name: asked.append((name, of, shown)))
+    with ui.row() as place:
+        mission.file_buttons(session, print)
+    for each in buttons(place).values():
+        press(each)
+    assert asked == [(name, session, print) for name in ("_open", "_new", "_save_as", "_revert", "_add_table")]
+
+
+def test_a_table_a_key_and_a_fault_are_gone_to_by_their_buttons(session, opened, monkeypatch):
+    page, called = opened(), []
+    for name in ("_show", "_go"):
+        monkeypatch.setattr(page, name, lambda *args, name=name: called.append((name, *args)))
+    page.list.clear()
+    page.entries = {}
+    session.edit(lambda draft: draft.set(LEO, "5 parsec").set(GEO, "6 furlong"))
+    page._list()
+    page._faults()
+    first, second = page.session.draft.problems
+    for each in (page.entries["orbit"][0], page.entries["terminals"][0], *buttons(page.faults).values()):
+        press(each)
+    assert called == [
+        *(("_show", "orbit"), ("_show", "terminals")),
+        *(("_go", LEO, first.line), ("_go", GEO, second.line)),
+    ]
+
+
+def test_a_line_is_removed_and_a_key_added_by_their_buttons(session, opened):
+    page, held = opened(), [*session.draft.values]
+    page.form.show("terminals")
+    place = page.form._place
+    choice = next(each for each in place.descendants() if "mission-choice" in each.classes)
+    choice.value = "terminals.geo_obscuration"
+    press(buttons(place)["Add"])
+    assert [key for key in session.draft.values if key not in held] == ["terminals.geo_obscuration"]
+    press(
+        next(each for each in place.descendants() if each.props.get("aria-label") == "Remove terminals.geo_obscuration")
+    )
+    assert [*session.draft.values] == held
+
+
+# ----------------------------------------------------------------------------------------------- with their settings
+@pytest.fixture
+def notes(monkeypatch):
+    """Notices of the pages, with their settings."""
+    found = []
+    monkeypatch.setattr(layout.ui, "notify", lambda words, **settings: found.append((words, settings)))
+    return found
+
+
+def test_a_refusal_stays_on_top_until_it_is_dismissed(notes):
+    layout.refuse("the reason\nin two lines")
+    settings = {"type": "negative", "multi_line": True, "timeout": 0, "close_button": "Dismiss", "position": "top"}
+    assert notes == [("the reason\nin two lines", settings)]
+
+
+@pytest.mark.parametrize("changed", [False, True])
+def test_a_command_that_reads_another_text_than_is_shown_is_copied_with_a_notice(session, notes, changed):
+    if changed:
+        session.set(LEO, "6 cm")
+    assert layout.file_of(session) == Path("leo-geo.toml")
+    words = "The command reads the file: save the mission first, for the same numbers."
+    assert notes == [(words, {"type": "warning"})] * changed
+
+
+@pytest.mark.parametrize(
+    ("refused", "python", "note"),
+    [
+        ("", False, ("Copied: microrad run 'a b'", {"type": "positive"})),
+        ("", True, ("Copied: one ...", {"type": "positive"})),
+        ("no", False, ("Not copied, no: microrad run 'a b'", {"type": "negative", "multi_line": True})),
+        ("no", True, ("Not copied, no: one\ntwo\n", {"type": "negative", "multi_line": True})),
+    ],
+)
+def test_a_copy_is_told_of_with_its_settings(monkeypatch, notes, refused, python, note):
+    asked = []
+
+    async def run(script, timeout):
+        asked.append((script, timeout))
+        return refused
+
+    monkeypatch.setattr(layout.ui, "run_javascript", run)
+    action = layout.Action(("run", "a b"), "one\ntwo\n")
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, layout._copy(action, python)).result()
+        assert thread.submit(asyncio.run, layout._copy(None, python)).result() is None
+    ((script, timeout),) = asked
+    assert ('writeText("one\\ntwo\\n")' if python else "writeText(\"microrad run 'a b'\")") in script
+    assert (timeout, notes) == (60.0, [note])
+    assert "the browser lets pages copy over https or from this machine only" in script
+
+
+def test_the_text_of_a_mission_is_edited_as_toml(session, opened):
+    page = opened()
+    editor = page.editor
+    assert (editor.props["language"], editor.props["theme"], editor.value) == ("TOML", "vscodeLight", TEXT)
+    assert page.section.default_slot.children.index(editor) < page.section.default_slot.children.index(page.faults)
+    heard = {each.type: each for each in page.section._event_listeners.values()}
+    assert [*heard] == ["paste.capture", "drop.capture"]
+    assert all("size <= 500000" in each.js_handler for each in heard.values())
+
+
+def test_a_text_that_is_too_long_is_refused_with_its_limit(session, opened, told):
+    opened()._too_much()
+    assert told == ["that text has more than 500000 characters and is no mission: it was not put in"]
+
+
+def test_what_is_behind_is_told_as_a_warning_and_not_taken(session, opened, notes):
+    page = opened()
+    page.shown = "another text"
+    page._text(SimpleNamespace(value="typed"))
+    words = "The mission was changed in another tab just now: the text shows it; type that again."
+    assert notes == [(words, {"type": "warning"})]
+    assert (session.draft.text, page.shown, page.editor.value) == (TEXT, TEXT, TEXT)
+
+
+def heard(element):
+    """What an element listens to, with what is done then."""
+    return {each.type: each.handler for each in element._event_listeners.values()}
+
+
+def test_a_name_that_is_typed_is_saved_by_the_key_enter_too(session, dialogs):
+    mission._save_as(session, lambda table: None)
+    name = next(each for each in dialogs[0].place.descendants() if isinstance(each, ui.input))
+    name.value = "other"
+    assert heard(name)["keydown.enter"] == dialogs[0].do
+    dialogs[0].do()
+    assert session.draft.path.name == "other.toml"
+
+
+def test_a_field_that_is_entered_or_changed_tells_its_own_key(session, opened, monkeypatch):
+    page, entered = opened(), []
+    monkeypatch.setattr(page.form, "_entered", entered.append)
+    for key in (GEO, LEO):
+        heard(page.form._rows[key].field)["focus"]()
+    assert entered == [GEO, LEO]
+    page.form._rows[GEO].field.value = "17 cm"
+    assert [session.draft.values[key].typed for key in (LEO, GEO)] == ["5 cm", "17 cm"]
+
+
+def test_a_key_is_looked_for_as_it_is_typed_in_the_field_above_the_tables(session, opened):
+    page = opened()
+    page.search.value = "  Data_RATE "
+    assert (page.form.sought, [*page.form._rows]) == (
+        "data_rate",
+        [key for key, value in session.draft.values.items() if "data_rate" in f"{key} {value.comment}".lower()],
+    )
+    page.search.value = None
+    assert (page.form.sought, page.form.table) == ("", "terminals")

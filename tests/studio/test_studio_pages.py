@@ -3,6 +3,7 @@
 import asyncio
 import io
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -53,7 +54,7 @@ from microrad.studio.pages import (
     runs_jobs,
     sliders,
 )
-from studio_pages import here, texts
+from studio_pages import buttons, here, outline, press, texts
 
 LEO = "terminals.leo_aperture"
 TEXT = SHIPPED.read_text("utf-8")
@@ -1676,3 +1677,780 @@ def test_each_page_asks_anew_once_a_file_that_the_mission_names_is_another(namin
     assert days.asked == links.asked and len(set(days.asked)) == 3
     assert (controls.made, len(seen), len(page.shows)) == (["PI"] * 3, 3, 3)
     assert ["# another mirror" in text for text in seen] == [False, True, True]
+
+
+# -------------------------------------------------------------------------------------------- what pages are built of
+OUTLINES = {
+    "compare": """
+div.compare-choice
+  select.compare-select[label=Compare with|dense|outlined] of other.toml, the shipped mission, a: one, b: another
+  div.studio-copy
+  div.soft for the other:
+  div.studio-copy
+div.no.kept[role=alert]
+div
+timer 0
+timer 0.5
+""",
+    "day": """
+div.studio-copy
+div.items-center
+  div[role=status]
+  q-linear-progress.day-bar[aria-label=Progress]<max-width: 20rem>
+  q-btn[dense|outline|no-caps] Cancel
+  q-btn[dense|outline|no-caps] Compute
+div.faults.kept.hidden[role=alert]
+div.hidden
+  div.soft A study of a whole mission takes the pointing loss that its loop leaves in place of this one.
+  div
+timer 0.5
+timer 0.25
+""",
+    "runs": """
+div.runs-start
+  section.runs-card[aria-label=Study]
+    h2 Study of the mission
+    div.soft Everything that follows from leo-geo.toml: verdict, figures, report.
+    input.runs-name[label=Folder for the results|dense|outlined]
+    div.runs-go
+      q-btn[no-caps] Run the study
+      div.studio-copy
+    div.no.kept[role=alert]
+  timer 0.5
+  timer 0
+  section.runs-card[aria-label=Campaign]
+    h2 Campaign
+    div.soft Many runs of a mission with drawn inputs: tails, sweeps, sensitivity.
+    select.runs-name[label=Campaign file|dense|outlined]
+    input.runs-name[label=Ledger|dense|outlined]
+    div.runs-go
+      q-btn[no-caps] Run the campaign
+      q-btn[outline|no-caps] Write an example
+      div.studio-copy
+    div.no.kept[role=alert]
+  timer 0
+  timer 4
+h2 Jobs
+div.soft They run in processes of their own, one after the other, and go on when this page is closed.
+div.soft Nothing was run in this folder yet.
+div.runs-list
+timer 0.5
+section.runs-viewer[aria-label=Report]
+""",
+    "link": """
+div.studio-copy
+div.beside
+  div.slider-column
+    div.sliders
+  div
+    div.faults.kept.hidden[role=alert]
+    h2 Margins
+    margin_cards
+    h2 Margin map
+    figure.margin-map[aria-label=Link margin over data rate and pointing error; in words below]
+    div.soft
+    div[role=status]
+    h2 Budgets
+    q-btn-toggle[aria-label=Budget shown|dense|no-caps]
+    table.wide-table[dense|flat|tabindex=0|row-key=id|wrap-cells|hide-bottom] of
+    h2 What follows
+    div.soft[role=status]
+    div
+timer 0.5
+timer 0.25
+""",
+    "pointing": """
+div.studio-copy
+div.beside
+  div.slider-column
+    div.sliders
+  div
+    div.faults.kept.hidden[role=alert]
+    h2 What the beacon covers
+    figure[aria-label=Probability that the pointing error is below an angle; totals in the table below]
+    h2 Lines and totals
+    figure[aria-label=Half widths of the lines and totals of the rules; in numbers in the tables below]
+    div
+    div.hidden
+      h2 Pointing error budget
+      div.soft[role=status]
+      div
+timer 0.5
+""",
+    "control": """
+div.studio-copy
+div.no.kept[role=alert]
+h2 Controllers of the mission
+div.soft Each is tuned for the least residual under the modulus margin of the mission.
+div.items-center
+  q-btn[dense|outline|no-caps] Tune all
+  q-btn.hidden[dense|flat|no-caps] Stop
+div
+h2 One controller
+div.control-asked
+  select[label=Controller|dense|outlined|options-dense]
+  input[label=Step|dense|outlined|debounce=500] = 100 urad
+  input[label=Sine, amplitude|dense|outlined|debounce=500] = 300 urad
+  input[label=Sine, frequency|dense|outlined|debounce=500] = 15 Hz
+  q-btn-toggle[aria-label=Hysteresis of the mirror|dense|no-caps] = both of both, with hysteresis, without
+div.soft[role=status]
+div.no.kept[role=alert]
+div.gap-0
+h3 By frequency
+div.plots
+  figure[aria-label=Sensitivity by frequency]
+  figure[aria-label=Loop gain by frequency]
+h3 A step of the reference on axis x
+div[role=status]
+div.plots
+  figure[aria-label=Step response]
+  figure[aria-label=Drive behind a step]
+h3 A sine of the reference on axis x
+div[role=status]
+div.plots
+  figure[aria-label=Error while a sine is followed]
+  figure[aria-label=Drive while a sine is followed]
+div
+  h3 Everything that disturbs the loop
+  div[role=status]
+  div.plots
+    figure[aria-label=Error under disturbance]
+    figure[aria-label=What is to be followed and what the mirror does]
+    figure[aria-label=Drive under disturbance]
+timer 0.5
+""",
+    "mirror": """
+div.studio-copy
+div.mirror-page
+  div.mirror-form
+    h2 Recordings
+    input.drop-zone[aria-label=Recordings: drop files here, or choose them|multiple|type=file]
+    div.soft.small Drop files on the field: CSV, text, LVM, TDMS, MAT, NPY, NPZ or HDF5; up to 200 MB each.
+    div.no.kept[role=alert]
+    div.gap-1
+    h2 Channels
+    select[label=Drive|dense|outlined|options-dense]
+    select[label=Angle or displacement|dense|outlined|options-dense]
+    div.pair
+      select[label=Unit of the drive|dense|outlined|options-dense] of V, mV
+      select[label=Unit of the output|dense|outlined|options-dense] of mrad, µrad, rad, µm, mm, m
+      input[label=Sample rate|hint=empty: as in the file|dense|outlined|debounce=400]
+      input[label=Lever arm|hint=50 mm; for a displacement|dense|outlined|debounce=400]
+    select[multiple|label=Go on in spite of|dense|outlined|clearable|use-chips|options-dense] of jitter, clipping, \
+dead, quantisation, drift, unexcited, lead
+    h2 Identification
+    input[label=Name of the mirror|hint=its file has this name and .toml|dense|outlined|debounce=400]
+    q-checkbox Hysteresis alone: two models, in seconds = False
+    q-checkbox No model that moves the wrong way = False
+    div.no.kept[role=alert]
+    q-btn[no-caps] Identify
+  div.mirror-seen
+    h2 Measured
+    div[role=status]
+    div.gap-1
+    div.plots
+      figure[aria-label=Measured loop: output over drive]
+      figure[aria-label=Drive and output over time]
+    h2 Identification
+    select.hidden[label=Identification|dense|outlined|options-dense]
+    div.kept[role=status] Nothing was identified yet.
+    q-linear-progress.hidden[aria-label=Progress of the identification]
+    q-btn.self-start.hidden[dense|outline|no-caps] Cancel
+    div.hidden
+      div
+        select[label=Model shown|dense|outlined|options-dense]<min-width: 14rem> = -1 of best so far
+        select[label=Recording shown|dense|outlined|options-dense]<min-width: 14rem> of
+      div.plots
+        figure[aria-label=Measured loop and that of the model]
+        figure[aria-label=Residual over time]
+      div.soft.small Residuals in per cent of the peak-to-peak output.
+      table.wide-table[dense|flat|tabindex=0|row-key=id|wrap-cells|hide-bottom] of Model, >Held out (rms), >Fitted \
+(rms), Note
+    div.gap-1
+    div
+    timer 0.5
+timer 0.5
+timer 0.5
+""",
+}
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_a_page_is_built_of_its_parts_in_their_order_each_with_its_name(session, tab, monkeypatch, name):
+    (session.folder / "other.toml").write_text(TEXT, "utf-8")
+    found = [SimpleNamespace(name="a", title="one"), SimpleNamespace(name="b", title="another")]
+    monkeypatch.setattr(compare.presets, "presets", lambda: found)
+    modules = {each.__name__.rpartition(".")[2]: each for each in (compare, control, day, link, mirror, pointing, runs)}
+    modules[name].page(session)
+    assert [line.rstrip() for line in outline(tab.content)] == OUTLINES[name].strip().splitlines()
+
+
+def card_of(state, number=1, kind="study", title="mine", results=(), beside=Others(), **more):  # noqa: B008
+    """Builds the card of a job, with what it has beside it."""
+
+    def build(session):
+        for name in results:
+            (session.folder / name).touch()
+        job = Job(number, session.folder, state, kind, title, ("run", "a b"), session.folder, results, **more)
+        return shown(runs_jobs._Card(runs_jobs.JobList(session, lambda *_: None), job), job, beside).element
+
+    return build
+
+
+def a_viewer(session):
+    viewer = runs._Viewer()
+    viewer.build()
+    viewer.show("/results/3/1", "3. page.html")
+    return viewer.place
+
+
+def a_panel(session):
+    panel = runs_jobs.CampaignPanel(session, session.folder / "x.ledger")
+    panel.open = True
+    plots = {"A": empty("a"), "B": empty("b")}
+    panel._show(Figures("Of 7 rows so far", "The limit is met.", [Soft("soft words")], plots))
+    return panel.place
+
+
+def an_identification(session):
+    view = mirror_job.JobView(session)
+    view.chosen = "play"
+    view._end(Job(4, session.folder, "done", "identification", results=("stage.toml", "stage.html")))
+    return view.end
+
+
+def recordings(session):
+    page = mirror.MirrorPage(session)
+    page.form = replace(page.form, seen="b")
+    page.listings = dict.fromkeys("bc", "it has no channel 3")
+    uses = zip(("a&b.csv", "b.csv", "c.csv"), ("fit", "check", "leave"), strict=True)
+    page._rows(tuple(mirror_form.Dropped(name[0], name, Path(), use) for name, use in uses))
+    return page.list
+
+
+def all_blocks(session):
+    rows = ((Cell("2 dB", "PASS"), "x"), (Cell("3 dB", "FAIL"), "sum"))
+    inner = (View("Inner", ["within"]), Table("a table", ("margin", "of\nwhat"), rows, words={1}, totals=1))
+    blocks = [
+        *("plain words", Soft("how to read it"), Verbatim("x = 1"), Verdict("it is missed", [], False)),
+        *(Verdict("it is met", [Points(["first", "second"])], True), Verdict("it is open"), View("Outer", inner)),
+        *(View("Folded away", ["hidden"], folded=True), Drawing("map", "The world", "Of one day", "<svg/>")),
+    ]
+    elements.Blocks().show_blocks(blocks, {"map": "data:image/png;base64,AA"})
+    return ui.context.client.content
+
+
+TIMES = {"started": "2026-03-20T12:00:00Z", "ended": "2026-03-20T12:01:30Z"}
+REPORT = Others(True, True, Job(6, Path(), "done", "export", results=("x.html",)))
+BUILT = {
+    "a card that waits": card_of("queued", title="<b>mine</b>", queued="2026-03-20T12:00:07Z"),
+    "a card that runs": card_of("running", 2, "campaign", "wide", progress=Progress(3, 8, "rows"), **TIMES),
+    "a card that is done": card_of("done", 3, results=("r.nc", "r.html"), code=1, **TIMES),
+    "a card that failed": card_of("failed", 4, "export", words="no room", code=2),
+    "a card of a campaign": card_of("lost", 5, "campaign", "wide", ("x.ledger",), beside=REPORT, words="it is gone"),
+    **{each.__name__: each for each in (a_viewer, a_panel, an_identification, recordings, all_blocks)},
+}
+SEEN = {
+    "a card that waits": """
+div.runs-head
+  h3 1. <b>mine</b>
+  div.runs-state.soft[role=status] waiting for the job before it
+  q-btn[dense|outline|no-caps] Cancel
+div.small.soft put in the queue 2026-03-20 12:00:07 UTC
+div.runs-results
+  div.runs-results
+  div.runs-results
+div
+code.mono.runs-command microrad run 'a b'
+""",
+    "a card that runs": """
+div.runs-head
+  h3 2. wide
+  div.runs-state.soft[role=status] running
+  q-btn[dense|outline|no-caps] Cancel
+q-linear-progress[aria-label=Progress of job 2|instant-feedback] = 0.375
+div.small 38 %, 3 of 8 rows
+div.small.soft started 2026-03-20 12:00:00 UTC, 90 s
+div.runs-results
+  div.runs-results
+div
+code.mono.runs-command microrad run 'a b'
+""",
+    "a card that is done": """
+div.runs-head
+  h3 3. mine
+  div.runs-state.no[role=status] done: not every requirement is met
+  q-btn[dense|flat|no-caps] Remove from the list
+div.small.soft started 2026-03-20 12:00:00 UTC, 90 s
+div.runs-results
+  div.runs-results
+  div.runs-results
+    link[href=/results/3/0] Save r.nc
+    q-btn[dense|no-caps] Show r.html here
+    link[href=/results/3/1|target=_blank] r.html in a tab of its own
+div
+details.runs-details[open]
+  summary What it printed
+  pre.runs-said[tabindex=0] said
+code.mono.runs-command microrad run 'a b'
+""",
+    "a card that failed": """
+div.runs-head
+  h3 4. mine
+  div.runs-state.no[role=status] failed
+  q-btn[dense|flat|no-caps] Remove from the list
+div.small.soft
+div.no.kept no room
+div.runs-results
+  div.runs-results
+  div.runs-results
+div
+code.mono.runs-command microrad run 'a b'
+""",
+    "a card of a campaign": """
+div.runs-head
+  h3 5. wide
+  div.runs-state.no[role=status] lost
+  q-btn[dense|outline|no-caps] Go on
+  q-btn[dense|outline|no-caps] Hide its figures
+  q-btn[dense|flat|no-caps] Remove from the list
+div.small.soft
+div.no.kept it is gone
+div.runs-results
+  div.runs-results
+    q-btn[dense|no-caps] Show x.html here
+    link[href=/results/6/0|target=_blank] x.html in a tab of its own
+  div.runs-results
+    link[href=/results/5/0] Save x.ledger
+div
+  section.runs-figures[aria-label=Figures of the campaign]
+    div.runs-rows No row is in the ledger yet.
+  timer 1
+code.mono.runs-command microrad run 'a b'
+""",
+    "a_viewer": """
+div.runs-head
+  h2 3. page.html
+  q-btn[dense|outline|no-caps] Close the report
+iframe.runs-frame[title=3. page.html|src=/results/3/1]
+""",
+    "a_panel": """
+div.runs-rows Of 7 rows so far
+div.kept The limit is met.
+div.runs-plot
+  select[label=Shown|dense|outlined] = A of A, B
+  figure[aria-label=Distribution over the rows: A]
+div
+  div.soft soft words
+""",
+    "an_identification": """
+div.items-center
+  q-btn[no-caps] Use this mirror in the mission
+  link[href=/results/4/1|target=_blank] Open the report
+  link[href=/results/4/0|target=_blank] Mirror file stage.toml
+""",
+    "recordings": """
+div.mirror-file
+  div.name a&b.csv
+  q-tooltip a&b.csv
+  select[aria-label=Use of a b.csv|dense|outlined|options-dense] = fit of fit, check only, leave out
+  q-btn[dense|flat|no-caps] Show
+  q-btn[dense|flat|no-caps] Remove
+div.mirror-file
+  div.name.seen b.csv
+  q-tooltip b.csv
+  select[aria-label=Use of b.csv|dense|outlined|options-dense] = check of fit, check only, leave out
+  q-btn[dense|flat|no-caps] Show
+  q-btn[dense|flat|no-caps] Remove
+div.no.kept.small it has no channel 3
+div.mirror-file
+  div.name c.csv
+  q-tooltip c.csv
+  select[aria-label=Use of c.csv|dense|outlined|options-dense] = leave of fit, check only, leave out
+  q-btn[dense|flat|no-caps] Show
+  q-btn[dense|flat|no-caps] Remove
+""",
+    "all_blocks": """
+div
+  div plain words
+  div.soft how to read it
+  div.kept.mono x = 1
+  div.FAIL.kept it is missed
+  div.PASS.kept it is met
+  ul.points
+    li first
+    li second
+  div it is open
+  h2 Outer
+  h3 Inner
+  div within
+  h3 a table
+  table.wide-table[dense|flat|tabindex=0|row-key=id|wrap-cells|hide-bottom] of >Margin, Of what
+  | 2 dB PASS PASS | x
+  | == | 3 dB FAIL FAIL | sum
+  expansion[label=Folded away|dense] Folded away = False
+    div hidden
+  img.picture[src=data:image/png;base64,AA|alt=The world]
+  div.soft.small The world. Of one day
+""",
+}
+
+
+@pytest.mark.parametrize("name", BUILT)
+def test_a_part_of_a_page_is_built_of_what_is_to_be_seen(session, tab, monkeypatch, name):
+    scripts = []
+    monkeypatch.setattr(runs.ui, "run_javascript", scripts.append)
+    monkeypatch.setattr(session.jobs, "output", lambda number: " said\n" if number == 3 else "")
+    assert [each.rstrip() for each in outline(BUILT[name](session), seen=True)] == SEEN[name].strip().splitlines()
+    scroll = "document.querySelector('.runs-viewer').scrollIntoView({behavior: 'smooth'})"
+    assert scripts == ([scroll] if name == "a_viewer" else [])
+
+
+CALLED = {
+    runs._Study: {"_run": "Run the study"},
+    runs._Campaign: {"_run": "Run the campaign", "_example": "Write an example"},
+    runs_jobs._Card: {
+        "_cancel": "Cancel",
+        "_go_on": "Go on",
+        "_toggle": "Show its figures",
+        "_write_page": "Write its report",
+        "_remove": "Remove from the list",
+    },
+    mirror.MirrorPage: {"start": "Identify"},
+    mirror_job.JobView: {"stop": "Cancel"},
+    control.ControlPage: {"tune_all": "Tune all", "stop_all": "Stop"},
+    day.DayPage: {"reload": "Compute"},
+}
+
+
+@pytest.mark.parametrize("of", CALLED, ids=lambda of: of.__name__)
+def test_each_button_does_what_it_says(session, tab, monkeypatch, of):
+    called = []
+    for name in CALLED[of]:
+        monkeypatch.setattr(of, name, lambda self, name=name: called.append(name))
+    job = Job(1, session.folder, "done", "campaign", "t", (), session.folder)
+    of(*((runs_jobs.JobList(session, print), job) if of is runs_jobs._Card else (session,)))
+    called.clear()
+    found = buttons(tab.content)
+    for said in CALLED[of].values():
+        press(found[said])
+    assert called == [*CALLED[of]]
+
+
+def test_a_recording_is_shown_and_removed_by_the_buttons_of_its_row(bench, monkeypatch):
+    called = []
+    for name in ("see", "remove"):
+        monkeypatch.setattr(bench, name, lambda key, name=name: called.append((name, key)))
+    bench._rows(tuple(mirror_form.Dropped(name[0], name, Path(), "fit") for name in ("a.csv", "b.csv")))
+    for each in [each for each in bench.list.descendants() if isinstance(each, ui.button)]:
+        press(each)
+    assert called == [("see", "a"), ("remove", "a"), ("see", "b"), ("remove", "b")]
+    monkeypatch.setattr(bench, "use", lambda key, use: called.append((key, use)))
+    [first, second] = [each for each in bench.list.descendants() if isinstance(each, ui.select)]
+    second.value, first.value = "leave", "check"
+    assert called[4:] == [("b", "leave"), ("a", "check")]
+
+
+def test_the_day_that_is_computed_is_cancelled_by_its_button(session, tab):
+    page = day.DayPage(session)
+    page.latest._state = State("k", running=True)
+    press(buttons(tab.content)["Cancel"])
+    assert page.latest.state == State()
+
+
+def test_a_report_is_closed_and_a_mirror_taken_by_their_buttons(session, tab, monkeypatch):
+    used, viewer = [], runs._Viewer()
+    monkeypatch.setattr(runs.ui, "run_javascript", used.append)
+    monkeypatch.setattr(mirror_job.JobView, "use", lambda self, mirror: used.append(mirror))
+    viewer.build()
+    viewer.show("/results/3/1", "a page")
+    viewer.show("/results/4/0", "another page")
+    assert texts(viewer.place) == ["another page", "Close the report"]
+    press(buttons(viewer.place)["Close the report"])
+    assert texts(viewer.place) == []
+    press(buttons(an_identification(session))["Use this mirror in the mission"])
+    assert used[2:] == [session.folder / "stage.toml"]
+
+
+@pytest.mark.parametrize("python", [False, True])
+def test_a_command_and_its_python_are_copied_each_by_its_own_button(tab, monkeypatch, python):
+    copied = []
+    monkeypatch.setattr(layout, "_copy", lambda action, python: copied.append((action, python)))
+    action = commands.Action(("a",), "b")
+    layout.copy_buttons(lambda: action)
+    press(buttons(tab.content)["Copy as Python" if python else "Copy as command"])
+    assert copied == [(action, python)]
+
+
+COPIED = {compare: 4, control: 2, day: 2, link: 2, pointing: 2}
+
+
+@pytest.mark.parametrize("module", COPIED, ids=lambda module: module.TITLE)
+def test_each_page_copies_what_it_shows(session, tab, monkeypatch, module):
+    copied = []
+    monkeypatch.setattr(layout, "_copy", lambda action, python: copied.append(action))
+    session.other = Draft.open(session.draft.path)
+    module.page(session)
+    for each in [each for each in tab.content.descendants() if getattr(each, "text", "").startswith("Copy as")]:
+        press(each)
+    of = {control: commands.design, day: commands.contacts}.get(module, commands.budget)
+    assert copied == [of(Path("leo-geo.toml"))] * COPIED[module]
+
+
+# ------------------------------------------------------------------------------------------- values that are not alike
+def test_the_sine_that_is_asked_for_at_first_is_the_last_of_the_scenario(session, controls):
+    session.set("scenario.amplitude", "123.25 urad")
+    session.set("scenario.pid_frequencies", "2 Hz, 3.5 Hz, 9.25 Hz")
+    asyncio.run(controls.reload())
+    assert (controls.step.value, controls.amplitude.value, controls.frequency.value) == (
+        *("100 urad", "123.25 urad", "9.25 Hz"),
+    )
+    ask, _ = controls.drawn[1]
+    assert (ask.step_rad, ask.sine_rad, ask.sine_hz) == pytest.approx((1e-4, 123.25e-6, 9.25))
+
+
+@pytest.mark.parametrize(
+    ("names", "first"),
+    [(("a",), "a"), (("a", "b", "c"), "a"), (("a", "b", "c", "d"), "b"), (("a", "b", "c", "d", "e"), "b")],
+)
+def test_the_second_of_more_than_three_controllers_is_shown_at_first(controls, monkeypatch, names, first):
+    monkeypatch.setattr(control, "_names", lambda table: names)
+    asyncio.run(controls.reload())
+    assert (controls.name.value, controls.made, [*controls.found]) == (first, [first], [*names])
+
+
+@pytest.fixture
+def inner(session):
+    """The session with its mission in a folder within the working folder, saved."""
+    (session.folder / "sub").mkdir()
+    path = session.folder / "sub" / "m n.toml"
+    path.write_text(TEXT, "utf-8")
+    session.replace(Draft.open(path))
+    return session
+
+
+@pytest.mark.parametrize("module", [control, day, link, pointing, compare], ids=lambda module: module.TITLE)
+def test_a_mission_in_an_inner_folder_is_copied_by_its_way_from_the_working_folder(inner, tab, monkeypatch, module):
+    copied = []
+    monkeypatch.setattr(layout, "_copy", lambda action, python: copied.append(action.arguments[1:]))
+    module.page(inner)
+    press(next(each for each in tab.content.descendants() if getattr(each, "text", "") == "Copy as command"))
+    assert copied == [("sub/m n.toml",)]
+
+
+def test_a_mission_in_an_inner_folder_is_run_by_its_way_and_named_by_its_own_name(inner, tab, asked):
+    study = runs._Study(inner)
+    assert study.about.text == "Everything that follows from sub/m n.toml: verdict, figures, report."
+    asyncio.run(study._name())
+    assert study.folder.value == "m n-study"
+    asyncio.run(study._run())
+    assert asked.orders[0].arguments == ("run", "sub/m n.toml", "--output", "m n-study")
+    assert asked.orders[0].results[0] == "m n-study/report.html"
+    campaign = runs._Campaign(inner)
+    asyncio.run(campaign._example())
+    assert 'mission = "sub/m n.toml"' in (inner.folder / "campaign.toml").read_text("utf-8")
+    inner.draft.path.unlink()
+    assert inner.disk_words() == "sub/m n.toml is not on disk any more; save it again"
+    assert compare._Page(inner)._name(inner.draft) == "sub/m n.toml (saved)"
+
+
+@pytest.mark.parametrize(
+    ("changed", "disk", "can"),
+    [(False, "", False), (True, "", True), (False, "changed", False), (True, "changed", True), (False, "gone", True)],
+)
+def test_the_button_of_the_frame_saves_where_there_is_something_to_save(session, tab, changed, disk, can):
+    if changed:
+        session.set(LEO, "6 cm")
+    if disk == "changed":
+        session.draft.path.write_text(TEXT.replace('"5 cm"', '"8 cm"'), "utf-8")
+    elif disk:
+        session.draft.path.unlink()
+    with ui.row() as place:
+        layout._state(session)
+    assert buttons(place)["Save"].enabled is can
+
+
+@pytest.mark.parametrize(
+    ("seen", "files", "asked_for"),
+    [("", "", None), ("a", "a", None), ("", "ab", "b"), ("gone", "ab", "b"), ("gone", "", ""), ("b", "ab", None)],
+)
+def test_the_newest_recording_is_shown_where_none_or_one_that_is_gone_was(bench, monkeypatch, seen, files, asked_for):
+    called = []
+
+    async def see(key):
+        called.append(key)
+
+    async def measured():
+        called.append("measured")
+
+    monkeypatch.setattr(bench, "see", see)
+    monkeypatch.setattr(bench, "_measured", measured)
+    put_in(bench, *(f"{name}.csv" for name in files))
+    bench.form, bench.kept = replace(bench.form, seen=seen), False
+    asyncio.run(bench.look())
+    assert called == [*([] if asked_for is None else [asked_for]), "measured"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "left", "shown"), [(2, 3, 2), (2, 1, 0), (2, 2, 1), (2, 0, -1), (-1, 1, -1), (0, 1, 0), (1, 1, 0)]
+)
+def test_a_model_that_was_chosen_is_the_last_where_there_are_fewer(session, job_view, chosen, left, shown):
+    view = job_view
+    view.jobs = [identified(session.folder, 2), identified(session.folder, 1)]
+    view.read = {"2": fits("a", "b", "c"), "1": fits("d", "e", "f")[:left]}
+    asyncio.run(view.look())
+    view.model.value = chosen
+    asyncio.run(view.choose(SimpleNamespace(value=1)))
+    assert (view.model.value, view.model.options) == (shown, {-1: "best so far", **dict(enumerate("def"[:left]))})
+    assert view.live.visible is (left > 0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "shows"),
+    [
+        ([], []),
+        (["sensitivity"], ["sensitivity", "notes", "told"]),
+        (["gain", "step"], ["gain", "step", "notes", "told"]),
+        (["sine", "jitter_drive"], ["sine", "jitter_drive", "told"]),
+    ],
+)
+def test_grey_is_what_answers_another_question_and_nothing_else(controls, asked, shows):
+    controls._dim([*controls.plots])
+    controls._dim(asked)
+    told = [controls.told_step, controls.told_sine, controls.told_jitter]
+    grey = {name for name, plot in controls.plots.items() if "behind" in plot.classes}
+    grey |= {"notes"} if "behind" in controls.notes.classes else set()
+    grey |= {"told"} if all("behind" in each.classes for each in told) else set()
+    assert grey == set(shows)
+    assert len({"behind" in each.classes for each in told}) == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [("a b-1_2.csv", "a b-1_2.csv"), ('x"y', "x y"), ("µ'<>&é", "µ    é"), ("", ""), ("a\nb\tc", "a b c")],
+)
+def test_a_name_within_a_property_keeps_letters_and_what_cannot_end_it(value, told):
+    assert mirror._attribute(value) == told
+
+
+@pytest.mark.parametrize(
+    ("code", "state", "look"), [(1, "done", "no"), (0, "done", "yes"), (None, "done", "yes"), (1, "cancelled", "soft")]
+)
+def test_a_state_that_changes_changes_its_colour(session, cards, code, state, look):
+    job = Job(2, session.folder, "queued", "study", "mine")
+    card = shown(runs_jobs._Card(cards, job), job)
+    assert "soft" in card.state.classes
+    shown(card, replace(job, state="failed"))
+    shown(card, replace(job, state=state, code=code))
+    assert [name for name in ("yes", "no", "soft") if name in card.state.classes] == [look]
+
+
+def test_a_table_shows_all_its_rows_and_tells_its_sums_by_a_class(tab):
+    made = elements.table(("a", "b"), numbers=(1,))
+    assert made.props[":pagination"] == "{rowsPerPage: 0}"
+    assert made.props[":table-row-class-fn"] == "row => row.total ? 'total' : ''"
+    assert [column[":classes"] for column in made.columns] == [
+        "row => ` ${row.mark0 ?? ''}`",
+        "row => `text-no-wrap ${row.mark1 ?? ''}`",
+    ]
+    assert [(column["name"], column["field"], column["align"]) for column in made.columns] == [
+        *(("c0", "c0", "left"), ("c1", "c1", "right")),
+    ]
+
+
+def test_each_class_of_the_style_is_one_of_the_pages():
+    folder = Path(layout.__file__).parent
+    style = re.sub(r"/\*.*?\*/", "", (folder / "style.css").read_text("utf-8"), flags=re.DOTALL)
+    styled = set(re.findall(r"\.([A-Za-z][\w-]*)", " ".join(re.findall(r"([^{}]+)\{", style))))
+    source = " ".join(path.read_text("utf-8") for path in (*folder.glob("*.py"), *folder.glob("*.js")))
+    own = {name for name in styled if not name.startswith(("q-", "nicegui-", "text-"))} - {"PASS", "FAIL"}
+    assert [name for name in sorted(own) if not re.search(rf"(?<![\w-]){name}(?![\w-])", source)] == []
+    given = set(" ".join(re.findall(r'classes\((?:add=)?"([^"]+)"', source)).split())
+    of_others = ["gap-0", "gap-1", "items-center", "js-plotly-plot", "self-start", "w-full", "day-bar", "margin-map"]
+    assert sorted(given - styled - set(of_others)) == []
+    for name in ("PASS", "FAIL", "behind", "no", "yes", "soft"):
+        assert f".{name}" in style
+
+
+def test_a_mirror_that_is_taken_is_told_as_good_news(session, job_view, monkeypatch):
+    said = []
+    monkeypatch.setattr(mirror_job.ui, "notify", lambda words, **settings: said.append((words, settings)))
+    job_view.use(session.folder / "sub" / "stage 2.toml")
+    words = "[mirror] of the mission names stage 2.toml now; save the mission to keep it."
+    assert said == [(words, {"type": "positive"})]
+    assert 'file = "sub/stage 2.toml"' in session.draft.text
+
+
+# -------------------------------------------------------------------------------------------------- what a slider tells
+SLIDERS = {
+    "terminals.leo_aperture": ("5 cm", "try_text", "6 cm", ("try", "6 cm")),
+    "terminals.geo_aperture": ("15 cm", "set_text", "17 cm", ("set", "17 cm")),
+    "beacon.divergence": ("780 urad", "try_place", 240, ("try", "5000 urad")),
+    "answer.transmit_power": ("0.1 W", "set_place", 0, ("set", "0.02 W")),
+}
+
+
+@pytest.mark.parametrize("key", SLIDERS)
+def test_a_slider_tells_what_is_tried_and_what_is_let_go(session, tab, key):
+    typed, event, given, told = SLIDERS[key]
+    session.set(key, typed)
+    found = {slider.key: slider for group in link_view.sliders(session.draft).values() for slider in group}
+    said = []
+
+    async def tried(key, text):
+        said.append(("try", key, text))
+
+    async def let_go(key, text):
+        said.append(("set", key, text))
+
+    row = sliders.SliderRow(found[key], tried, let_go)
+    begin = {"fault": "", "text": typed, "place": found[key].position, "steps": 240}
+    assert (row.props["label"], row.props["begin"]) == (found[key].label, begin)
+    heard = {each.type: each.handler for each in row._event_listeners.values()}
+    assert [*heard] == ["try_text", "set_text", "try_place", "set_place"]
+    asyncio.run(heard[event](SimpleNamespace(args=given)))
+    assert said == [(told[0], key, told[1])]
+    assert (row.typed, row.busy) == (told[1], told[0] == "try")
+
+
+BOARD = """
+h2
+  div Answer
+slider[label=Transmit power]
+slider[label=Divergence]
+slider[label=Pointing error]
+slider[label=Distance]
+slider[label=Required power]
+expansion[label=Answer: 4 more|dense] Answer: 4 more = False
+  slider[label=Wavelength]
+  slider[label=Strehl]
+  slider[label=Transmit optics loss]
+  slider[label=Receive optics loss]
+h2
+  div Required
+slider[label=Margin]
+slider[label=Pointing error]
+expansion[label=Required: 1 more|dense] Required: 1 more = False
+  slider[label=Outage]
+"""
+
+
+def test_the_sliders_that_are_seldom_moved_stand_folded_below_their_group(session, tab):
+    groups, board = link_view.sliders(session.draft), sliders.SliderBoard(print, print, link_view.second)
+    board.show({name: groups[name] for name in ("Answer", "Required")})
+    assert outline(board._box) == BOARD.strip().splitlines()
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_browser_has_five_seconds_to_draw(tab, monkeypatch, late):
+    figure, asked = elements.Figure("of what"), []
+
+    async def drawn(name, *args, timeout):
+        asked.append((name, args, timeout))
+        if late:
+            raise TimeoutError
+
+    monkeypatch.setattr(figure, "run_method", drawn)
+    monkeypatch.setattr(elements, "stay", asked.append)
+    asyncio.run(figure.draw({"data": 1}))
+    assert asked == [("draw", ({"data": 1},), 5.0), figure]

@@ -5,12 +5,13 @@ import os
 import re
 import tomllib
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from drawn import block_lines
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
@@ -935,3 +936,128 @@ def test_a_folder_of_another_program_is_no_study(session, draft, number):
     (session.folder / "other").mkdir()
     (session.folder / "other" / "manifest.json").write_text(text, "utf-8")
     assert number in text and compare_view.finished_study(session, draft).folder == "mine"
+
+
+UNLIKE = {
+    "communication.data_rate": ("622.08 Mbit/s", "1.25 Gbit/s"),
+    "communication.pointing_error": ("7.3 urad", "5.5 urad"),
+    "beacon.divergence": ("780 urad", "512.5 urad"),
+    "requirement.margin": ("1.7 dB", "2.25 dB"),
+    "name": ("one", "two"),
+}
+BESIDE = """
+View Links
+  Table
+  | number | in a.toml | in b.toml (saved) | change = 0
+  | Communication: margin | 0.87 dB, required 1.70 dB FAIL | −1.82 dB, required 2.25 dB FAIL | −2.69 dB
+  | Communication: received power | 28.4 nW | 30.7 nW | +2.29 nW
+  | Beacon: margin | 6.30 dB, required 0.00 dB PASS | 3.01 dB, required 0.00 dB PASS | −3.29 dB
+  | Beacon: received power | 42.7 pW | 20 pW | −22.7 pW
+  | Answer: margin | 9.51 dB, required 0.00 dB PASS | 9.51 dB, required 0.00 dB PASS | same
+  | Answer: received power | 893 pW | 893 pW | same
+  | Data rate | 622 Mbit/s | 1.25 Gbit/s | +628 Mbit/s
+  | Largest data rate with the required margin | 405 Mbit/s | 342 Mbit/s | −62.4 Mbit/s
+  | Open-loop pointing error, root sum square | 390 µrad | 390 µrad | same
+  | Acquisition by the wide beacon: probability | 0.9985 | 2.863e-12 | −0.9985
+  | Acquisition by the wide beacon: mean time | 20.3 s | none |
+View Verdicts
+  Soft a.toml: no study of this text is in the folder; the page Runs makes one.
+  Verdict b.toml (saved): 1 of 2 requirements is missed (b-study) False
+  Table
+  | number | in a.toml | in b.toml (saved) | change = 0
+  | margin | none | 1.31 dB, required 1.70 dB FAIL |
+  | residual | none | 7.25 µrad, required 10 µrad PASS |
+View Differences
+  6 keys differ; a table that one of them lacks is one.
+  Table
+  | key | in a.toml | in b.toml (saved) = 0
+  | name | one | two
+  | beacon.divergence | 780 urad / paper: section 2.1 | 512.5 urad / mission file, line 57, in place of 780 urad \
+(paper: section 2.1)
+  | communication.pointing_error | 7.3 urad / mission file, line 81, in place of 10 urad (paper: Table 2 and \
+section 2.2) | 5.5 urad / mission file, line 82, in place of 10 urad (paper: Table 2 and section 2.2)
+  | communication.data_rate | 622.08 Mbit/s / mission file, line 83, in place of 300 Mbit/s (paper: section 2.2) | \
+1.25 Gbit/s / mission file, line 84, in place of 300 Mbit/s (paper: section 2.2)
+  | requirement.margin | 1.7 dB / mission file, line 92, in place of 3 dB (paper: section 2.2) | 2.25 dB / mission \
+file, line 93, in place of 3 dB (paper: section 2.2)
+  | terminals.geo_obscuration | not given | 0.2
+"""
+
+
+def test_two_unlike_missions_are_compared_in_all_their_numbers_studies_and_keys(session, draft):
+    here, there = draft, draft.set("terminals.geo_obscuration", "0.2")
+    for key, (one, other) in UNLIKE.items():
+        here, there = here.set(key, one), there.set(key, other)
+    requirements = [
+        {"name": "margin", "actual": 1.31, "required": 1.7, "unit": "dB", "met": False},
+        {"name": "residual", "actual": 7.25e-6, "required": 10e-6, "unit": "rad", "met": True},
+    ]
+    finished(session, there, "b-study", verdict="1 of 2 requirements is missed", requirements=requirements)
+    found = compare_view.blocks(session, here, there, ("a.toml", "b.toml (saved)"))
+    assert [line.replace("| -", "| −") for line in block_lines(found)] == BESIDE.strip().splitlines()
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "names", "words"),
+    [
+        ("5 parsec", "5 cm", ("a", "b"), ["a has no link budget:"]),
+        ("5 cm", "6 parsec", ("a", "b"), ["b has no link budget:"]),
+    ],
+)
+def test_a_mission_without_a_budget_stands_beside_the_numbers_of_the_other(session, draft, here, there, names, words):
+    key = "terminals.leo_aperture"
+    (links, *_) = compare_view.blocks(session, draft.set(key, here), draft.set(key, there), names)
+    fault, table = links.blocks
+    assert [fault.headline.splitlines()[0]] == words and "parsec" in fault.headline and fault.good is False
+    absent = 1 if "parsec" in here else 2
+    assert {row[absent] for row in table.rows} == {"none"} and {row[3] for row in table.rows} == {""}
+    assert "none" not in {row[3 - absent] for row in table.rows}
+    assert table.headings == ("number", "in a", "in b", "change")
+
+
+@pytest.mark.parametrize(
+    ("kind", "state", "code", "words"),
+    [
+        ("study", "done", 0, "done: every requirement is met"),
+        ("study", "done", 1, "done: not every requirement is met"),
+        ("campaign", "done", 0, "done: the rows keep the limits"),
+        ("campaign", "done", 1, "done: the rows do not keep the limits"),
+        ("identification", "done", 0, "done"),
+        ("export", "done", 1, "done"),
+        ("campaign", "done", None, "done"),
+        ("study", "failed", 1, "failed"),
+        ("campaign", "cancelled", 0, "cancelled"),
+        ("study", "unreadable", None, "unreadable"),
+        ("campaign", "running", 0, "running"),
+    ],
+)
+def test_a_job_of_each_kind_says_what_was_found(tmp_path, kind, state, code, words):
+    assert runs_view.state_words(Job(1, tmp_path, state, kind, code=code)) == words
+
+
+@pytest.mark.parametrize(
+    ("done", "total", "what", "words"),
+    [
+        (0, 7, "rows", "0 %, 0 of 7 rows"),
+        (1, 2000, "rows", "0.1 %, 1 of 2000 rows"),
+        (99, 1000, "12.5 rows/s", "9.9 %, 99 of 1000 rows"),
+        (199, 2000, "rows", "10 %, 199 of 2000 rows"),
+        (1999, 2000, "draws", "99 %, 1999 of 2000: draws"),
+        (2000, 2000, "draws", "100 %, 2000 of 2000: draws"),
+        (3, 0, "links", "0 %, 3 of 0: links"),
+    ],
+)
+def test_a_share_is_told_beside_what_it_is_a_share_of(done, total, what, words):
+    assert runs_view.progress_words(Progress(done, total, what)) == words
+
+
+@pytest.mark.parametrize(
+    ("seconds", "took"), [(0, "0 s"), (1, "1 s"), (90, "90 s"), (3600, "60 min"), (7200, "2 h"), (-5, "0 s")]
+)
+def test_how_long_a_job_took_or_takes_is_told_behind_its_start(tmp_path, seconds, took):
+    now = datetime(2026, 3, 20, 12, 0, 0, tzinfo=UTC) + timedelta(seconds=seconds)
+    job = Job(1, tmp_path, "done", queued="2026-03-19T00:00:00Z", started="2026-03-20T12:00:00Z")
+    words = f"started 2026-03-20 12:00:00 UTC, {took}"
+    assert runs_view.time_words(job, lambda: now) == words
+    ended = replace(job, ended=now.isoformat())
+    assert runs_view.time_words(ended, lambda: datetime(2030, 1, 1, tzinfo=UTC)) == words

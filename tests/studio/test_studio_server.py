@@ -9,10 +9,11 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import urllib.error
 import urllib.request
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -25,6 +26,7 @@ from microrad.studio import server
 from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.guard import signing
 from microrad.studio.guard.address import ExposureError
+from microrad.studio.guard.middleware import Limits
 from microrad.studio.guard.names import NameRefusedError
 from microrad.studio.jobs.queue import Job, Order
 from microrad.studio.session import STUDIO, Session
@@ -878,3 +880,96 @@ def test_an_installation_that_lacks_libraries_names_each(monkeypatch):
         )
     monkeypatch.setattr(server.util, "find_spec", lambda name: 1)
     assert server.check_installed() is None
+
+
+# ------------------------------------------------------------------------------------------------- with what it is run
+def test_the_pages_are_run_behind_the_guard_with_all_their_settings(file, monkeypatch):
+    nicegui = pytest.importorskip("nicegui")
+    ran, signed, added = [], [], []
+    monkeypatch.setenv("NICEGUI_STORAGE_PATH", "before")
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(nicegui.ui, "run_with", lambda app, **settings: ran.append((app, settings)))
+    monkeypatch.setattr(server.policy, "sign_template", signed.append)
+    monkeypatch.setattr(server, "_add_pages", added.append)
+    session, entrance = Session(file.parent), server.Entrance(None, ("a:81", "b:81"), "t" * 32)
+    guard = server.application(session, entrance)
+    ((app, settings),) = ran
+    assert settings == {
+        "title": "microrad studio",
+        "language": "en-US",
+        "show_welcome_message": False,
+        "gzip_middleware_factory": None,
+        "reconnect_timeout": 60.0,
+    }
+    assert (guard.app, guard.hosts, guard.origins) == (app, ("a:81", "b:81"), ("http://a:81", "http://b:81"))
+    assert (guard.documents, guard.limits, guard.cookie) == (("/results/",), Limits(), "microrad_studio_81")
+    assert [(route.path, route.methods) for route in app.routes] == [("/results/{number}/{place}", {"GET"})]
+    assert (len(signed), added) == (1, [session])
+    spool = session.studio / "uploads" / "spool"
+    assert tempfile.tempdir == str(spool)
+    storage = Path(os.environ["NICEGUI_STORAGE_PATH"])
+    assert storage.name.startswith("microrad-") and len(storage.name) == 41 and not storage.exists()
+
+
+def test_each_page_has_its_path_and_a_title_of_the_studio(monkeypatch):
+    nicegui = pytest.importorskip("nicegui")
+    pages, framed = [], []
+    monkeypatch.setattr(nicegui.ui, "page", lambda path, title: lambda build: pages.append((path, title, build)))
+    monkeypatch.setattr(server, "_framed", lambda *given: framed.append(given) or given[1].TITLE)
+    server._add_pages("session")
+    names = ["Mission", "Links", "Pointing", "Day", "Mirror", "Control", "Runs", "Compare"]
+    paths = ["/", "/link", "/pointing", "/day", "/mirror", "/control", "/runs", "/compare"]
+    assert pages == [(path, f"{name} - microrad studio", name) for path, name in zip(paths, names, strict=True)]
+    assert {given[2] for given in framed} == {tuple(zip(names, paths, strict=True))}
+    assert [given[1].TITLE for given in framed] == names
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_server_is_quiet_waits_for_open_pages_and_takes_its_way_in_away(file, monkeypatch, fails):
+    uvicorn = pytest.importorskip("uvicorn")
+    ran, session = [], Session(file.parent)
+
+    def run(sockets):
+        ran.append(sockets)
+        assert (session.studio / "open.html").exists()
+        if fails:
+            raise OSError("it cannot listen")
+
+    monkeypatch.setattr(server, "application", lambda *given: ("guarded", *given))
+    monkeypatch.setattr(uvicorn, "Config", lambda app, **settings: (app, settings))
+    monkeypatch.setattr(server, "_server", lambda *given: ran.append(given) or SimpleNamespace(run=run))
+    entrance = SimpleNamespace(listener="listener")
+    server.way_in(session.studio, "http://127.0.0.1:81/?token=t")
+    with pytest.raises(OSError, match="it cannot listen") if fails else nullcontext():
+        server.serve(session, entrance, print)
+    settings = {"log_level": "warning", "timeout_graceful_shutdown": 10} | server.address.server_settings()
+    assert ran == [((("guarded", session, entrance), settings), print), ["listener"]]
+    assert not (session.studio / "open.html").exists()
+    logger = logging.getLogger("uvicorn.error")
+    assert server._is_news in logger.filters
+    logger.removeFilter(server._is_news)
+
+
+def test_the_page_that_leads_in_refreshes_at_once_and_tells_nobody(tmp_path):
+    url = "http://127.0.0.1:81/?token=t"
+    assert server.way_in(tmp_path, url) == (tmp_path / "open.html").as_uri()
+    assert (tmp_path / "open.html").read_text("ascii") == (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">\n'
+        f'<meta http-equiv="refresh" content="0;url={url}"><title>microrad studio</title></head>\n'
+        f'<body><p><a href="{url}">Open the studio</a></p></body></html>\n'
+    )
+
+
+ANOTHER = "give another one with --port, or leave --port out for a free one"
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.EADDRINUSE, f"port 81 is in use, perhaps by another studio; {ANOTHER}"),
+        (errno.EACCES, "port 81 is not open to this user; give one from 1024 on with --port"),
+        (errno.EADDRNOTAVAIL, "'lab' port 81 cannot be listened on: why; give an address of this machine"),
+    ],
+)
+def test_a_port_that_is_not_taken_has_its_whole_words(number, words):
+    assert server._unbound("lab", 81, OSError(number, "why")) == words

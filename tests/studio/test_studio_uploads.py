@@ -27,7 +27,7 @@ from lab import test_recording_formats as formats
 from microrad.lab.live_fit import extremes
 from microrad.lab.recording import read_recording
 from microrad.studio.guard import names
-from microrad.studio.guard.names import NameRefusedError, safe_name, within
+from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words, within
 from microrad.studio.recordings import process, reading
 from microrad.studio.recordings import uploads as recording_uploads
 from microrad.studio.recordings.reading import Columns, ReadingError, ReadingLimits, list_channels, view
@@ -1234,3 +1234,60 @@ def test_a_form_gives_one_file_and_is_closed_whatever_becomes_of_it(tmp_path, mo
         "the file '' is not taken: it has no name",
         "the file 'b' has more than 0.001 MB",
     ]
+
+
+@pytest.mark.parametrize(
+    ("there", "files", "words"),
+    [
+        (1, 1, "the file 'new.csv' is not taken: 1 recording is here already; remove one first"),
+        (2, 2, "the file 'new.csv' is not taken: 2 recordings are here already; remove one first"),
+        (3, 1, "the file 'new.csv' is not taken: 3 recordings are here already; remove one first"),
+        (3, 4, ""),
+        (0, 0, "the file 'new.csv' is not taken: 0 recordings are here already; remove one first"),
+    ],
+)
+def test_a_file_too_many_is_told_with_how_many_there_are(tmp_path, there, files, words):
+    for k in range(there):
+        save(Uploads(tmp_path), f"{k}.csv", b"x")
+    uploads = Uploads(tmp_path, UploadLimits(files=files))
+    if not words:
+        assert save(uploads, "new.csv", b"x").name == "new.csv"
+        return
+    with pytest.raises(UploadError) as refusal:
+        save(uploads, "new.csv", b"x")
+    assert str(refusal.value) == words
+    assert len(uploads.listed()) == there
+
+
+@pytest.mark.parametrize(
+    ("sizes", "total", "words"),
+    [
+        ((700, 800), 1500, ""),
+        ((700, 801), 1500, "all recordings together may have 0.0015 MB; remove one first"),
+        ((3, 1_234_568), 1_234_567, "all recordings together may have 1.235 MB; remove one first"),
+    ],
+)
+def test_recordings_beyond_what_all_may_have_are_told_with_that_limit(tmp_path, sizes, total, words):
+    uploads = Uploads(tmp_path, UploadLimits(total_bytes=total))
+    first, second = sizes
+    save(uploads, "a.csv", b"x" * first)
+    if not words:
+        assert save(uploads, "b.csv", b"x" * second).size == second
+        return
+    with pytest.raises(UploadError) as refusal:
+        save(uploads, "b.csv", b"x" * second)
+    assert str(refusal.value) == f"the file 'b.csv' is not taken: {words}"
+    assert [each.name for each in uploads.listed()] == ["a.csv"]
+
+
+DEVICES = "con PRN aux nul CONIN$ conout$ com0 Com5 lpt9 LPT1 COM¹ com² lpt³.txt prn.tar.gz conin$.csv"
+
+
+@pytest.mark.parametrize("name", DEVICES.split())
+def test_each_device_of_windows_is_no_name(name):
+    with pytest.raises(NameRefusedError) as refusal:
+        safe_name(name)
+    words = f"the file '{name}' is not taken: its name is that of a device on Windows; rename it and drop it again"
+    assert str(refusal.value) == words
+    assert typed_words(refusal.value) == words.replace("rename it and drop it again", "choose another name")
+    assert safe_name(f"a{name}") == f"a{name}"

@@ -1359,3 +1359,59 @@ def test_the_body_is_free_from_the_end_of_the_contact_before(monkeypatch, place,
     seen = found.geometry(at)
     for name, more in (("range_m", 1.0), ("rate_rad_s", 2.0), ("point_ahead_rad", 3.0)):
         np.testing.assert_array_equal(getattr(seen, name), at + more)
+
+
+@pytest.mark.parametrize(("dark", "at"), [(3, None), (4, (0.5, 0.9, 0.9 + 2.0 * 2.375e7 / C_M_S, 9))])
+def test_lock_is_held_for_whole_periods_though_they_do_not_divide_in_floats(dark, at):
+    optics = SimpleNamespace(field_of_view_rad=1e-3, every=1)
+    loop = SimpleNamespace(timing=SimpleNamespace(period_s=0.1), optical=optics)  # 0.3 s of them are 2.9999999999999996
+    sampler = SimpleNamespace(settings=SimpleNamespace(hold_s=0.3), loop=loop)
+    time, margin = 0.1 * np.arange(12.0), np.ones(12)
+    margin[5 : 5 + dark] = -1.0
+    ends = Sight(np.array([2e7, 2.9e7]), np.zeros(2), np.zeros(2))
+    loss, kept = Sampler._loss(sampler, time, 1e-6 * np.arange(12.0), margin, ends, 0)
+    if at is None:
+        assert (loss, kept) == (None, 12)
+        return
+    assert [loss.since_s, loss.time_s, loss.known_s, kept] == pytest.approx(list(at), rel=1e-9)
+    assert loss.cause == "margin below 0 dB for 400 ms at 0.500 s: 8 µrad off, range 23800 km"
+
+
+RUN = Settings(1.5, 0.25, 3, 0.5, 0.125, 0.0625, 7, 2)
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: Contact(5.0, 5.0, "", "", 0.0, None),
+     "a contact from 5 s to 5 s has no length: its end must be finite and come after its begin"),
+    (lambda: Contact(5.0, 9.0, "", "", 5.5, None),
+     "free_from_s is 5.5 s, and the contact begins at 5 s: it must be finite and no later; where the body is "
+     "busy for longer, let the contact begin later"),
+    (lambda: replace(RUN, slew_angle_rad=3.25),
+     "slew_angle_rad of a contact run is 3.25: it must be finite and from 0 to pi rad"),
+    (lambda: replace(RUN, slew_rate_rad_s=0.0),
+     "slew_rate_rad_s of a contact run is 0: it must be finite and above 0 rad/s"),
+    (lambda: replace(RUN, windows=100_001),
+     "windows of a contact run is 100001: it must be finite and from 1 to 100000"),
+    (lambda: replace(RUN, window_s=math.inf), "window_s of a contact run is inf: it must be finite and above 0 s"),
+    (lambda: replace(RUN, settle_s=-1.0), "settle_s of a contact run is -1: it must be finite and at least 0 s"),
+    (lambda: replace(RUN, hold_s=0.5),
+     "hold_s of a contact run is 0.5: it must be finite and at least 0 s and below window_s (500 ms): a window "
+     "shows no loss that takes longer"),
+    (lambda: replace(RUN, seed=-1), "seed of a contact run is -1: it must be finite and from 0 to 2^63 - 1"),
+    (lambda: replace(RUN, way="beacon"), 'way of a contact run is "beacon": it must be "wide beacon" or "scan"'),
+])  # fmt: skip
+def test_a_refusal_of_a_contact_is_one_whole_sentence(found, expected):
+    with pytest.raises((ValueError, ArithmeticError)) as refused:
+        found()
+    assert str(refused.value) == expected
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: [x for each in plan(100.0, 100.25, RUN) for x in each], "100 0.25"),
+    (lambda: [x for each in plan(100.0, 101.25, RUN) for x in each], "100 0.5 100.75 0.5"),
+    (lambda: [x for each in plan(100.0, 900.0, RUN) for x in each], "100 0.5 499.75 0.5 899.5 0.5"),
+    (lambda: MovingReference(3e-6, 2e-5, 1.7, point_ahead_rate_rad_s=-4e-7, acceleration_rad_s2=6e-7).at([0.0, 2.5]),
+     "4.86715221e-06 4.00758304e-06"),
+])  # fmt: skip
+def test_plans_and_references_at_their_edges_have_these_numbers(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)

@@ -169,3 +169,22 @@ def test_the_scan_keeps_its_loop_gain_on_a_mirror_of_another_gain(monkeypatch, t
     doubled = edited(tmp_path, ('mirror_angle = "line-of-sight"', 'mirror_angle = "mechanical"'))
     (usual,), (other,) = paper.scan(cases_of(mission)).points, paper.scan(cases_of(doubled)).points
     assert_allclose(other.linear_rms[15.0], usual.linear_rms[15.0], rtol=1e-3)
+
+
+POINT = paper.Point(
+    "cascade", 1e3, 2e6, True, {1.0: 2.0, 15.0: 4.0}, {1.0: 0.5, 15.0: 0.75}, {1.0: 2.03, 15.0: 4.1},
+    {15.0: 19e-6, 25.0: 34e-6}, {15.0: 6.6e-6, 25.0: 9.9e-6},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("found", "expected"), [
+    (lambda: POINT.holds().values(), "1 1 1 1 1"),
+    (lambda: replace(POINT, stable=False).holds().values(), "0 0 0 0 0"),
+    (lambda: replace(POINT, pid_rms={1.0: 2.02, 15.0: 4.1}).holds().values(), "0 1 1 1 1"),
+    (lambda: replace(POINT, added_rms={1.0: 2.0, 15.0: 2.0}).holds().values(), "1 0 1 1 1"),
+    (lambda: replace(POINT, inverse_peak={15.0: 9e-6, 25.0: 10.5e-6}).holds().values(), "1 1 1 1 0"),
+    (lambda: [POINT.drop_rad(15.0), POINT.drop_rad(25.0)], "1.24e-05 2.41e-05"),
+    (lambda: [len(x) for x in paper.Scan((POINT, replace(POINT, stable=False))).together()], "5 1"),
+])  # fmt: skip
+def test_a_point_of_the_scan_holds_claims_up_to_their_limits(found, expected):
+    assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
