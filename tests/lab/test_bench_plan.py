@@ -726,3 +726,16 @@ def test_what_an_excitation_says_of_its_own_goes_to_its_design(tmp_path):
     assert (
         str(refused.value) == f"{path}: no record is named 'm'; the plan has c, m-1, m-2, s-12.4416hz, s-24.8832hz, t."
     )
+
+
+@pytest.mark.parametrize(("formats", "told"), [('["mat", "mat73"]', True), ('["mat73", "npz"]', False)])
+def test_two_records_do_not_write_one_file(refuse, tmp_path, formats, told):
+    text = TWO_AXES.replace("[excitation.t]", "[excitation.C-V73]").replace('["npz", "csv"]', formats)
+    if told:
+        (fault,) = refuse(text).faults
+        assert (fault.key, fault.reason) == ("excitation", 'writes two records to "c-v73.mat", as mat and as mat73')
+        assert fault.expected == "names that stay different, or one of the two formats"
+    else:
+        path = tmp_path / "plan.toml"
+        path.write_text(text, encoding="utf-8")
+        assert load_plan(path).formats == ("mat73", "npz")

@@ -107,7 +107,7 @@ def test_one_of_several_channels_is_read_as_a_signal_by_its_name(tmp_path):
         assert (signal.name, signal.unit, signal.rate_hz) == ("angle (urad)", "urad", pytest.approx(500.0))
         assert_allclose(signal.samples, Y, atol=1e-11)
     with pytest.raises(
-        RecordingError, match=r"the file has 2 channels beside its time \('time', 'power \(W\)', 'angle"
+        RecordingError, match=r"the file has 2 channels beside its time \('power \(W\)', 'angle \(urad\)'\); name"
     ):
         read_signal(path)
     alone = read_signal(csv(tmp_path / "b.csv", "power (W)", X))

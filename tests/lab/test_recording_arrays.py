@@ -273,6 +273,9 @@ def test_the_axis_of_samples_has_two_hundred_at_least(tmp_path, samples):
         ((0.8, None), "from 0.8 s to the end is no part"),
         ((-0.1, 0.8), "from -0.1 s to 0.8 s is no part"),
         ((0.0, 0.801), "from 0 s to 0.801 s is no part"),
+        ((np.nan, None), "from nan s to the end is no part"),
+        ((0.0, np.nan), "from 0 s to nan s is no part"),
+        ((0.0, np.inf), "from 0 s to inf s is no part"),
         ((0.0, 0.8), ""),
         ((0.4, 0.8), ""),
     ],
@@ -499,12 +502,13 @@ def test_realisations_of_arrays_in_memory_are_named_and_joined_period_by_period(
     assert [each.path for each in found] == [f"bench 2 realisation {r}" for r in range(5)]
     assert {(each.rate_hz, each.period_samples, each.samples) for each in found} == {(622.08, 230, 690)}
     np.testing.assert_array_equal(found[4].output[460:, 2], SEEN[:, 2, 4, 2])
-    for drive, output in ((FEW, SEEN[..., :2]), (FEW[:, :, :4], SEEN), (FEW[:225], SEEN), (FEW[..., 0], SEEN)):
+    none = (FEW[:, :, :0], SEEN[:, :, :0])
+    for drive, output in ((FEW, SEEN[..., :2]), (FEW[:, :, :4], SEEN), (FEW[:225], SEEN), (FEW[..., 0], SEEN), none):
         with pytest.raises(RecordingError) as caught:
             multisine_recordings(drive, output, 622.08, "bench 2")
         assert str(caught.value) == (
             f"bench 2: drive has shape {drive.shape} and output {output.shape}; give (samples, channels, realisations, "
-            "periods) with the same samples, realisations and periods."
+            "periods) with the same samples, realisations and periods, at least one of each."
         )
 
 
@@ -537,3 +541,11 @@ def test_axes_that_are_none_are_told_in_all_words(tmp_path, axes, words):
         read_arrays(tmp_path / "a.npz", axes=axes)
     advice = "name each axis of the array in its order, out of samples, channels, realisations, periods."
     assert str(refused.value) == f"{tmp_path / 'a.npz'}: --axes (axes) {words}{advice}"
+
+
+@pytest.mark.parametrize(("sample", "words"), [(np.inf, "is inf"), (1e300, "its largest sample")])
+def test_a_sample_of_a_drive_that_is_no_size_is_refused_without_a_warning(tmp_path, sample, words):
+    drive = FEW.copy()
+    drive[5, 1, 2, 1] = sample
+    np.savez(tmp_path / "a.npz", u=drive, y=SEEN, fs=RATE_HZ)
+    assert words in refusal(tmp_path / "a.npz", "u", "y")

@@ -699,7 +699,7 @@ def steps_found(steps, resolution_s=0.0):
         ({40: 1.49e-3}, "scatter"),
         (
             {40: 2e-3},
-            "row 41, time: 0.002 s since the sample before, where 0.001 s is usual; 1 gap, about 1 samples lost",
+            "row 41, time: 0.002 s since the sample before, where 0.001 s is usual; 1 gap, about 1 sample lost",
         ),
         ({40: 2e-3, 60: 4e-3}, "row 41, .* 2 gaps, about 4 samples lost"),
         ({40: 0.0}, "row 41, time: 0 s since the sample before, where 0.001 s is usual, once in all"),
@@ -1714,3 +1714,22 @@ def test_an_output_of_fewer_than_fifty_steps_is_refused_and_from_five_hundred_on
         "drive more evenly"
     )
     assert not noted.refused
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "lost", "told"),
+    [
+        (100.0, 200, "200, t: 0.02 s since the sample before, where 0.01 s is usual; 1 gap, about 1 sample lost"),
+        (50.0, 150, "0.04 s since the sample before, where 0.02 s is usual; 1 gap, about 1 sample lost"),
+        (102.4, None, ""),
+        (97.0, None, ""),
+    ],
+)
+def test_a_lost_sample_shows_where_the_time_has_just_the_digits_of_its_step(rate_hz, lost, told):
+    time_s = np.delete(np.round(np.arange(401) / rate_hz, 2), [] if lost is None else [lost])
+    if told:
+        with pytest.raises(RecordingError, match=told):
+            rate_of_time("a.csv", "t", time_s, str)
+    else:
+        rate, _ = rate_of_time("a.csv", "t", time_s, str)
+        assert rate.rate_hz == pytest.approx(rate_hz, rel=3e-3)

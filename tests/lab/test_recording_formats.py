@@ -2168,7 +2168,19 @@ def test_a_variable_that_is_no_channel_says_why(dtype, shape, words):
         ("v[0,3]", (slice(None), 0, 3)),
         *(
             (wanted, None)
-            for wanted in ("v[2, 0]", "v[0, 4]", "v[1]", "v[0, 0, 0]", "w[0, 0]", "v", "v[]", 0, "v[-1, 0]")
+            for wanted in (
+                "v[2, 0]",
+                "v[0, 4]",
+                "v[1]",
+                "v[0, 0, 0]",
+                "w[0, 0]",
+                "v",
+                "v[]",
+                "v[0 0]",
+                "v[0,]",
+                0,
+                "v[-1, 0]",
+            )
         ),
     ],
 )

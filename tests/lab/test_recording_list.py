@@ -780,3 +780,12 @@ def test_places_and_signs_of_two_axes_are_counted_in_all_words(tmp_path, line, w
     channels = 'input = ["ux", "uy"]\noutput = ["x", "y"]\naccept = ["drift", "lead"]'
     text = f'{line}\n{channels}\n[recording.a]\nfile = "a.csv"\n'
     assert refusal(tmp_path, text) == f"{tmp_path / 'list.toml'}: {words}"
+
+
+@pytest.mark.parametrize("spelled", ["./a.csv", "../{folder}/a.csv", "{whole}/a.csv", "link.csv"])
+def test_a_file_is_the_same_however_it_is_spelled(tmp_path, spelled):
+    (tmp_path / "link.csv").symlink_to(tmp_path / "a.csv")
+    name = spelled.format(folder=tmp_path.name, whole=tmp_path)
+    entry = '[recording.{}]\nfile = "{}"\ninput = 1\noutput = 2\n'
+    told = faults(tmp_path, entry.format("a", "a.csv") + entry.format("b", name) + 'role = "validation"\n')
+    assert "takes samples for validation that [recording.a] fits" in told["recording.b", 5]

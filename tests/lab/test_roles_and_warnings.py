@@ -605,7 +605,8 @@ def test_a_held_out_sample_beyond_a_fiftieth_of_the_fitted_range_is_counted(lost
     drive = np.concatenate([[-7.0, 20.0], np.linspace(0, 10, 48), lost])
     seen = Prediction(drive, drive, 1, 2, 0)
     found = warnings.held_out_warnings([recording(1e3 * drive)], Units("mV", "urad"), (0.0, 10.0), [seen])
-    samples = f"{told} held-out samples lie outside the fitted drive range; the held-out residual judges them too."
+    lie, them = ("sample lies", "it") if told == 1 else ("samples lie", "them")
+    samples = f"{told} held-out {lie} outside the fitted drive range; the held-out residual judges {them} too."
     assert found == ([] if told is None else [samples])
 
 

@@ -415,6 +415,12 @@ def test_scans_of_numbers_unlike_each_other_keep_their_paths(found, expected):
     (lambda: replace(PATHS[1], turn_around_s=-0.1), "Raster.turn_around_s is -100 ms: it must be finite, at least 0 s"),
     (lambda: Detector(0.0), "Detector.detection_time_s is 0 s: it must be finite, above 0 s"),
     (lambda: Detector(1.0, 0.0), "Detector.probability is 0: it must be finite, above 0, at most 1"),
+    (lambda: StepStare(SOUGHT, Detector(7.12341e-3), 7.123e-3),
+     "the dwell of 7.123 ms is shorter than the detection time of 7.124 ms: dwell at least that long"),
+    (lambda: Spiral(SOUGHT, Detector(7.0e-3), 3.7145e-3),
+     "at 3.7145 mrad/s the beam crosses the target faster than the detection time of 7 ms: scan at 3.714 mrad/s or "
+     "slower"),
+    (lambda: simulate_scan(PATHS[0], 1.5, 1), "the number of runs is 1.5: it must be whole, at least 1"),
 ])  # fmt: skip
 def test_a_refusal_of_a_search_says_what_its_beam_does(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:

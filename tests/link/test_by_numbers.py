@@ -303,3 +303,10 @@ def test_a_refusal_by_numbers_names_the_one_that_is_wrong(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+def test_no_loss_is_no_negative_zero():
+    (line,) = (
+        x for x in received_power(0.3, 2e-5, 4e7, 0.1, 8e-7, losses_db={"fibre": 0.0}).lines if x.name == "fibre"
+    )
+    assert f"{line.value:.2f}" == "0.00"

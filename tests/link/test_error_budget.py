@@ -472,7 +472,7 @@ AT_2 = replace(FAST, A=np.diag([-2.0, -3.0]))
         (lambda: source("random", -1.0), "give a size of 0 or above"),
         (lambda: source("constant", gains=np.zeros((2, 2))), "give a finite one for each axis"),
         (lambda: source("constant", gains=[]), "gains have the shape (0,); give a finite one for each axis"),
-        (lambda: source("constant", gains=[1.0, math.nan]), "gains have the shape (2,); give a finite one"),
+        (lambda: source("constant", gains=[1.0, math.nan]), "gains are [1.0, nan]; give a finite one"),
         (
             lambda: source("constant", gains=replace(FAST, B=np.ones((2, 2)), D=np.zeros((1, 2)))),
             "its transfer has 2 inputs; give a stable system of one input",
@@ -1353,7 +1353,7 @@ def test_sources_by_themselves_under_each_index_and_interpretation_have_these_nu
     (lambda: source("random", gains=np.ones((2, 1))),
      "a random error: its gains have the shape (2, 1); give a finite one for each axis"),
     (lambda: source("constant", gains=np.array([1.0, math.nan])),
-     "a constant error: its gains have the shape (2,); give a finite one for each axis"),
+     "a constant error: its gains are [1.0, nan]; give a finite one for each axis"),
     (lambda: budget([], [APE]), "a budget without a source: give one or more"),
     (lambda: budget(two(), [APE], [Correlation("a", "c", 0.5)]),
      "correlation of a and c: name two sources out of a, b"),

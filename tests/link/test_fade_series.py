@@ -338,7 +338,7 @@ def test_levels_and_normalisations():
         ),
         (np.r_[np.ones(300), np.nan], {}, "sample 300 is nan, .* finite, 0 or above and at most"),
         (np.r_[np.ones(300), 1e31], {}, r"sample 300 is 1e\+31, .* at most 1e\+30"),
-        (np.r_[np.ones(300), 400.0], {"unit": "dB"}, "sample 300 is 400, .* at most 300 dB"),
+        (np.r_[np.ones(300), 400.0], {"unit": "dB"}, "sample 300 is 400, .* a number up to 300 dB"),
         (np.zeros(300), {}, "no sample is above 0: there is no light"),
         (np.full(300, -np.inf), {"unit": "dB"}, "no sample is above 0: there is no light"),
         (np.ones(300), {"unit": "W"}, "the unit is 'W'; give one of linear, dB"),
@@ -398,7 +398,7 @@ def test_a_tenth_of_the_faded_time_may_be_in_fades_of_a_single_sample(alone, ref
     power[300 : 300 + 20 * alone : 20] = 0.05
     link = linked(series_of(power, normalised="largest"), 100)
     if refused:
-        with pytest.raises(FadeSeriesError, match=r"12 % of the time below .* at most 10 % may be"):
+        with pytest.raises(FadeSeriesError, match=r"11\.8 % of the time below .* at most 10 % may be"):
             coded_fading(link, 3.0, 1e-6)
     else:
         assert coded_fading(link, 3.0, 1e-6).fades.unresolved == pytest.approx(0.1, rel=1e-12, abs=0.0)
@@ -468,7 +468,7 @@ def test_files_that_are_no_series_are_refused(tmp_path):
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(200_000_001)
-    refused("large.csv", "the file has 200 MB and at most 200 MB are read")
+    refused("large.csv", "the file has 200.1 MB and at most 200 MB are read")
 
 
 def test_the_code_has_the_paths_that_its_threshold_follows_from():
@@ -495,7 +495,7 @@ def test_a_file_of_the_largest_size_is_read(tmp_path, monkeypatch, spare, taken)
     if taken:
         assert read_fade_series(path, **given).source == "the fades"
     else:
-        with pytest.raises(FadeSeriesError, match=r"^the fades: the file has 0 MB"):
+        with pytest.raises(FadeSeriesError, match=r"^the fades: the file has 406 B"):
             read_fade_series(path, **given)
 
 
@@ -512,7 +512,7 @@ def test_levels_of_a_file_are_levels_however_it_writes_them(tmp_path, unit):
 def test_a_series_as_long_as_is_needed_is_long_enough():
     series = series_of(np.ones(1000))
     series.at_least_as_long_as(series.duration_s, "a word lasts")
-    with pytest.raises(FadeSeriesError, match="the series lasts 10 ms and a word lasts 10 ms"):
+    with pytest.raises(FadeSeriesError, match=r"the series lasts 10 ms and a word lasts 10\.01 ms"):
         series.at_least_as_long_as(series.duration_s * (1.0 + 1e-6), "a word lasts")
 
 
@@ -664,7 +664,7 @@ def test_an_interval_is_told_from_sixteen_parts_or_more(count, each, left):
     (lambda: series_of(np.r_[np.ones(250), np.inf, -1.0]), "series: sample 250 is inf, and 2 such samples are in it: "
      "a power must be finite, 0 or above and at most 1e+30; cut out a part without them."),
     (lambda: series_of(np.r_[np.zeros(250), np.nan, -np.inf, 301.0, -5.0], unit="dB"), "series: sample 250 is nan, "
-     "and 2 such samples are in it: a power must be at most 300 dB; cut out a part without them."),
+     "and 2 such samples are in it: a power must be a number up to 300 dB; cut out a part without them."),
     (lambda: series_of(np.zeros(200)), "series: no sample is above 0: there is no light in the series; name another "
      "one."),
     (lambda: series_of(np.tile([1.0, 1.0, 0.1], 100), normalised="largest").resolves(0.5), "series: the series is "
@@ -788,8 +788,8 @@ def test_a_series_at_its_edges_has_these_numbers(found, expected):
      "flat: sample 100 is -2, and 100 such samples are in it: a power must be finite, 0 or above and at most "
      '1e+30 (unit "dB" if these are levels); cut out a part without them.'),
     (lambda: flat_of([1.0, 301.0], "mean", unit="dB"),
-     "flat: sample 100 is 301, and 100 such samples are in it: a power must be at most 300 dB; cut out a part "
-     "without them."),
+     "flat: sample 100 is 301, and 100 such samples are in it: a power must be a number up to 300 dB; cut out "
+     "a part without them."),
     (lambda: flat_of([1.0, 2e30], "mean"),
      "flat: sample 100 is 2e+30, and 100 such samples are in it: a power must be finite, 0 or above and at most "
      "1e+30; cut out a part without them."),
@@ -797,8 +797,8 @@ def test_a_series_at_its_edges_has_these_numbers(found, expected):
      "flat: the normalisation is 'median'; give one of mean, largest, as-given."),
     (lambda: flat_of([1.0, 2.0], "mean", unit="W"), "flat: the unit is 'W'; give one of linear, dB."),
     (lambda: flat_of([math.nan, 2.0], "mean", unit="dB"),
-     "flat: sample 0 is nan, and 100 such samples are in it: a power must be at most 300 dB; cut out a part "
-     "without them."),
+     "flat: sample 0 is nan, and 100 such samples are in it: a power must be a number up to 300 dB; cut out "
+     "a part without them."),
     (lambda: FadeSeries.of(np.ones((100, 2)), 1.0, "s", unit="dB", normalised="mean"),
      "s: the powers have the shape (100, 2); give one series, of shape (samples,)."),
     (lambda: FadeSeries.of(np.ones(200), 0.0, "s", unit="dB", normalised="mean"),
@@ -823,3 +823,10 @@ def test_a_refusal_of_a_coded_series_is_one_whole_sentence(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+@pytest.mark.parametrize(("words", "high"), [(3, 0.8290), (15, 0.2976)])
+def test_a_few_words_none_of_which_is_lost_have_the_interval_of_as_many_trials(words, high):
+    found = coded_module._share(np.zeros(words, dtype=bool))
+    assert (found.value, found.low, found.high) == (0.0, 0.0, pytest.approx(high, abs=1e-4))
+    assert high == pytest.approx(1.0 - 0.005 ** (1.0 / words), abs=1e-4)

@@ -578,8 +578,8 @@ def test_links_to_a_station_unlike_each_other_have_these_numbers(unlike, of, cas
     ("up", [
         ("Turbulence spread loss (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = 111 mm, or what 7 "
          "corrected modes and the point-ahead angle leave, if that is less | mission file, line 33; mission "
-         "file, line 34 | mean power on the axis, wander in it (Andrews and Phillips 2005) | the point-ahead "
-         "angle is 7.8 isoplanatic angles: adaptive optics measures other air than the beam goes through"),
+         "file, line 34; mission file, line 38 | mean power on the axis, wander in it (Andrews and Phillips 2005) | "
+         "the point-ahead angle is 7.8 isoplanatic angles: adaptive optics measures other air than the beam goes through"),
         ("Turbulence fade (dB): scintillation index 0.19, wander of 6.08 µrad rms; what it adds to the pointing "
          "loss, all together exceeded for 1 % of the time | mission file, line 33; mission file, line 34; "
          "mission file, line 35; mission file, line 62 | any strength, by its index | "),
@@ -589,15 +589,16 @@ def test_links_to_a_station_unlike_each_other_have_these_numbers(unlike, of, cas
          "(Andrews and Phillips), but spread and wander are those of weak turbulence"),
     ]),
     ("disk", [
-        ("Turbulence coupling loss (dB): mean power into the detector, r0 = 111 mm | mission file, line 33; "
-         "mission file, line 34 | Kolmogorov's turbulence, long exposure | "),
+        ("Turbulence coupling loss (dB): mean power into the detector, r0 = 111 mm, 4 modes corrected | mission "
+         "file, line 33; mission file, line 34; mission file, line 38 | Kolmogorov's turbulence, what correction "
+         "leaves of it | "),
         ("Turbulence fade (dB): scintillation index 0.0335; what it adds to the pointing loss, all together "
          "exceeded for 1 % of the time | mission file, line 33; mission file, line 34; mission file, line 35; "
          "mission file, line 66 | any strength, by its index | "),
         ("Turbulence spread loss (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = 70.5 mm, or what 4 "
          "corrected modes and the point-ahead angle leave, if that is less | mission file, line 33; mission "
-         "file, line 34 | mean power on the axis, wander in it (Andrews and Phillips 2005) | moderate "
-         "turbulence: the Rytov variance is 0.454, above 0.3; an index is that for any strength (Andrews and "
+         "file, line 34; mission file, line 38 | mean power on the axis, wander in it (Andrews and Phillips 2005) | "
+         "moderate turbulence: the Rytov variance is 0.454, above 0.3; an index is that for any strength (Andrews and "
          "Phillips), but spread and wander are those of weak turbulence; the point-ahead angle is 12 isoplanatic "
          "angles: adaptive optics measures other air than the beam goes through"),
         ("Turbulence fade (dB): scintillation index 0.411, wander of 6.47 µrad rms; exceeded for 1 % of the time "

@@ -221,7 +221,7 @@ def test_a_margin_that_no_value_has_is_left_by_none(tmp_path):
 def numbered(value, above=-math.inf, below=math.inf, key="a.key"):
     """An input whose table is the number itself, allowed between two bounds."""
     rule = SimpleNamespace(out_of_bounds=lambda number: "" if above <= number <= below else "is beyond")
-    return SimpleNamespace(key=key, value=value, rule=rule, moved=lambda tables, number: number)
+    return SimpleNamespace(key=key, shown=key, value=value, rule=rule, moved=lambda tables, number: number)
 
 
 def solve(margin_db, value=1.0, unit="dB", required_db=0.0, possible=lambda _: True, **bounds):
@@ -292,3 +292,26 @@ def test_a_margin_that_hardly_moves_does_not_move():
 ])  # fmt: skip
 def test_a_key_that_is_none_is_answered_with_its_like(found, expected):
     assert found() == expected
+
+
+def biased(folder, *bias):
+    return link_file(folder, NO_BEAMS, {"jitter": {**UNLIKE["jitter"], "bias": list(bias)}})
+
+
+@pytest.mark.parametrize(("bias", "key", "searched"), [
+    (("0 urad", "-1 urad"), "jitter.bias", (-1.0, -1e-12)),
+    (("-4 urad", "1 urad"), "jitter.bias", (-math.pi / 2, -4e-12)),
+    (("1 urad", "-2 urad"), "jitter.bias.2", (-math.pi / 2, -2e-12)),
+])  # fmt: skip
+def test_values_below_0_are_looked_for_by_their_size_and_told_in_order(tmp_path, bias, key, searched):
+    solution = link_study.solve_key(biased(tmp_path, *bias), key)
+    found = only(solution)
+    assert solution.solved.searched == pytest.approx(searched, rel=1e-12, abs=0.0)
+    assert searched[0] < found.low < found.high < 0.0 and (found.low_open, found.high_open) == (False, True)
+    assert solution.value == found.low == min(solution.file.mission.jitter.bias_rad)
+    assert link_study.run_link_study(solution.file).communication.margin_db == pytest.approx(3.0)
+
+
+def test_an_item_that_is_0_is_refused_by_its_place(tmp_path):
+    with pytest.raises(ValueError, match=r"^jitter\.bias\.1 is 0, which no factor moves"):
+        link_study.solve_key(biased(tmp_path, "0 urad", "-1 urad"), "jitter.bias.1")

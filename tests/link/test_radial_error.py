@@ -243,7 +243,7 @@ def test_probabilities_of_axes_unlike_each_other(found, expected):
 
 UPRIGHT = Jitter((-1.2 * URAD, 0.8 * URAD), (0.0, 1.7 * URAD))
 NARROW = Jitter((2.4 * URAD, -0.5 * URAD), (1.9 * URAD, 2e-9 * URAD))
-STILL = Jitter((3.0 * URAD, -4.0 * URAD), (0.0, 0.0))
+AT_REST = Jitter((3.0 * URAD, -4.0 * URAD), (0.0, 0.0))
 
 
 @pytest.mark.parametrize(("found", "expected"), [
@@ -254,9 +254,9 @@ STILL = Jitter((3.0 * URAD, -4.0 * URAD), (0.0, 0.0))
     (lambda: [*radial_survival(NARROW, [2e-6, 2.6e-6, 9e-6]), *radial_cdf(NARROW, [2e-6, 2.6e-6])],
      "0.607599844 0.472809351 0.00026377077 0.392400172 0.527190646"),
     (lambda: radial_quantile(NARROW, [0.3, 1e-5]), "3.43907788e-06 1.0515187e-05"),
-    (lambda: radial_survival(STILL, [4.9e-6, 5e-6, 5.1e-6]), "1 0 0"),
-    (lambda: radial_cdf(STILL, [4.9e-6, 5e-6, 5.1e-6]), "0 1 1"),
-    (lambda: radial_quantile(STILL, [0.2, 0.9]), "5e-06 5e-06"),
+    (lambda: radial_survival(AT_REST, [4.9e-6, 5e-6, 5.1e-6]), "1 0 0"),
+    (lambda: radial_cdf(AT_REST, [4.9e-6, 5e-6, 5.1e-6]), "0 1 1"),
+    (lambda: radial_quantile(AT_REST, [0.2, 0.9]), "5e-06 5e-06"),
     (lambda: [(s := radial_steps(UPRIGHT))[0].size, s[0] @ s[1], s[0] ** 2 @ s[1], s[1].sum(), s[0][0], s[0][-1]],
      "4000 2.04538865e-06 4.96994625e-12 1 2.73027756e-09 2.18394902e-05"),
     (lambda: [(s := radial_steps(Jitter((0.0, 0.0), (3e-6, 3e-6))))[0].size, s[0] @ s[1], s[0][-1], s[1].sum()],

@@ -416,3 +416,18 @@ def test_a_refusal_of_air_says_its_numbers_and_bounds(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+def test_air_beyond_the_satellite_does_not_count():
+    near = SlantPath(HufnagelValley(2.1e-14, 18.0), 5.3e-7, 0.94, 1.2e5)
+    _, distance, strength = SlantPath(near.profile, near.wavelength_m, near.elevation_rad, 1e6).layers()
+    there = distance < near.range_m
+    assert 0 < np.count_nonzero(there) < there.size
+    left, k = 1.0 - distance[there] / near.range_m, near.wavenumber
+    expected = 2.25 * k ** (7 / 6) * strength[there] @ (distance[there] * left) ** (5 / 6)
+    assert near.spherical_rytov == pytest.approx(expected, rel=1e-12)
+    assert near.moment(2.0) == pytest.approx(strength[there] @ distance[there] ** 2, rel=1e-12)
+    up = Uplink(near, 0.6)
+    radius = 0.6 * np.hypot(1.0, 2.0 * distance[there] / (k * 0.6**2))
+    wander = 2.07 * strength[there] @ (left**2 * radius ** (-1 / 3))
+    assert up.wander_rms_rad("dios-2004") == pytest.approx(math.sqrt(wander), rel=1e-12)

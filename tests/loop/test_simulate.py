@@ -421,8 +421,9 @@ def test_a_reversal_every_ten_samples_counts_and_one_every_eleven_does_not():
     [
         (0, 0, ""),
         (0, 3, "the amplifier's slew limit"),
-        (50, 0, "the amplifier's limits (25 % of the samples)"),
-        (50, 3, "the amplifier's limits (25 % of the samples)"),
+        (1, 0, "the amplifier's limits (1 of 200 samples)"),
+        (50, 0, "the amplifier's limits (50 of 200 samples)"),
+        (50, 3, "the amplifier's limits (50 of 200 samples)"),
     ],
 )
 def test_what_an_amplifier_held_back_is_its_limits_before_its_slew_limit(saturated, slewed, words):

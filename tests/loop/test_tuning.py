@@ -903,6 +903,7 @@ def test_a_tuning_that_fails_says_what_the_nearest_has_on_how_many_plants(rows, 
         (0.506, 300.0, Specification(0.5, 100.0), ("b at its most",)),
         (0.506, 101.0, Specification(0.5, 100.0), ("bandwidth", "b at its most")),
         (0.4, 50.0, Specification(0.5, 0.0), ("modulus margin", "b at its most")),
+        (0.506, 0.0, Specification(0.5, 0.0), ("b at its most",)),
     ],
 )
 def test_a_tuned_controller_is_told_by_its_first_plant_its_worst_and_all_of_them(

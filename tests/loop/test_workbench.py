@@ -585,3 +585,8 @@ def test_a_pid_of_several_axes_is_the_same_on_each_and_acts_on_no_other(axes):
     assert_allclose(made.anti_windup, np.kron(np.eye(axes), one.B / one.D), rtol=1e-9)
     plain = Controller.pid(5.0, rate_hz=100.0)
     assert (plain.system.order, plain.system.D.tolist()) == (0, [[5.0]])
+
+
+def test_disturbances_in_a_list_are_added_up_as_those_in_a_tuple():
+    listed = replace(ALONE, vibration=[HUM, ROLL])
+    assert listed.residual_rms_rad(SINGLE) == pytest.approx(ALONE.residual_rms_rad(SINGLE), rel=1e-12)

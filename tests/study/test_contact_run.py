@@ -1412,6 +1412,7 @@ def test_a_refusal_of_a_contact_is_one_whole_sentence(found, expected):
     (lambda: [x for each in plan(100.0, 900.0, RUN) for x in each], "100 0.5 499.75 0.5 899.5 0.5"),
     (lambda: MovingReference(3e-6, 2e-5, 1.7, point_ahead_rate_rad_s=-4e-7, acceleration_rad_s2=6e-7).at([0.0, 2.5]),
      "4.86715221e-06 4.00758304e-06"),
+    (lambda: [b for b, _ in plan(0.0, 0.3, replace(RUN, windows=3, window_s=0.1, hold_s=0.01))], "0 0.1 0.2"),
 ])  # fmt: skip
 def test_plans_and_references_at_their_edges_have_these_numbers(found, expected):
     assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)

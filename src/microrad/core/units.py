@@ -363,6 +363,19 @@ def format_limit(limit: float, unit: str, digits: int = 4, *, least: bool = Fals
     return format_quantity(rounded, unit, digits)
 
 
+def format_beyond(value: float, limit: float, unit: str, digits: int = 4) -> str:
+    """A quantity that breaks a limit, or keeps it just so, in as many more digits as tell it from the limit.
+
+    Args:
+        value: The value in the SI unit.
+        limit: The limit in the SI unit.
+        unit: The SI unit.
+        digits: Significant digits where these tell the two apart; ten at most.
+    """
+    more = (n for n in range(digits, 10) if f"{value:.{n}g}" != f"{limit:.{n}g}")
+    return format_quantity(value, unit, next(more, 10))
+
+
 def _prefix(magnitude: float, symbol: str) -> str:
     """The prefix that leaves one to three digits before the point, as far as `symbol` takes one ("m^2" takes none)."""
     if symbol not in _UNITS or not 0.0 < magnitude < math.inf:

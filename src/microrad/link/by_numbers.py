@@ -127,7 +127,7 @@ def received_power(
     ]
     for name, loss in (losses_db or {}).items():
         _check(f"the loss {name!r}", loss, Quantity("dB", least=0.0), "a loss is positive")
-        lines.append(Line(name, -loss, "dB", _GIVEN, _GIVEN, ""))
+        lines.append(Line(name, 0.0 - loss, "dB", _GIVEN, _GIVEN, ""))
     return ReceivedPower(tuple(lines))
 
 

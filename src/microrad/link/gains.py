@@ -164,7 +164,7 @@ def strehl_loss_db(strehl: float, convention: str) -> float:
         return strehl
     if convention == "ratio":
         _SHARE.check("the Strehl ratio", strehl, "1 is a perfect wavefront")
-        return -10.0 * math.log10(strehl)
+        return 0.0 - 10.0 * math.log10(strehl)
     raise ValueError(f'Strehl convention "{convention}" is neither "decibel" nor "ratio"')
 
 

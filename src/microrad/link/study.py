@@ -168,7 +168,7 @@ def solve_key(file: LinkFile, key: str) -> Solution:
         of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.beam_passes
     solved = variation.solve(m, found, unit, margin, required, possible)
     if not solved.intervals:
-        return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
+        return Solution(key, unit, of, required, solved, max((each.value for each in found), key=abs), file)
     first, last = solved.intervals[0], solved.intervals[-1]
     value = last.high if first.low_open else first.low
     mission = variation.moved(m, found, value)

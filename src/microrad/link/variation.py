@@ -86,14 +86,14 @@ def inputs(tables: Table, name: str) -> Iterator[Input]:
 def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | None:
     """The tables with an input at another value, or None where its rule does not allow it.
 
-    Where the input has several items, the largest takes the value and the others stay in proportion to it.
+    Where the input has several items, the largest in size takes the value, the others stay in proportion to it.
 
     Args:
         tables: The tables that hold the input.
         found: The input, or its items.
         value: The new value, in the SI unit of the input.
     """
-    largest = max(each.value for each in found)
+    largest = max((each.value for each in found), key=abs)
     for each in found:
         own = value if each.value == largest else value * each.value / largest
         if each.rule.out_of_bounds(own):
@@ -322,7 +322,7 @@ class Solved:
     """The intervals of an input that leave a margin, and the value with the largest one, with that margin.
 
     ``searched`` are the least and the most value that was looked at: `DECADES` from its own, or as far as its rule
-    allows. Values of an input of two axes are those of the larger one.
+    allows. Values of an input of two axes are those of the one that is larger in size.
     """
 
     intervals: tuple[Interval, ...]
@@ -352,13 +352,14 @@ def solve(
     Raises:
         ValueError: If the input is 0 and no decibels, which no factor moves, or does not move the margin.
     """
-    value, count = max(each.value for each in found), DECADES * STEPS
-    linear = unit.startswith("dB")
+    value, count = max((each.value for each in found), key=abs), DECADES * STEPS
+    name = found[0].shown if len(found) == 1 else found[0].key
+    linear, rising = unit.startswith("dB"), math.copysign(1.0, value)
     if not linear and value == 0.0:
-        raise ValueError(f"{found[0].key} is 0, which no factor moves: give it a value to begin with")
+        raise ValueError(f"{name} is 0, which no factor moves: give it a value to begin with")
 
     def at(step: float) -> float:
-        return value + 10.0 * step / STEPS if linear else value * 10.0 ** (step / STEPS)
+        return value + 10.0 * step / STEPS if linear else value * 10.0 ** (rising * step / STEPS)
 
     def margin(step: float) -> float:
         m = moved(mission, found, at(step))
@@ -373,7 +374,7 @@ def solve(
     margins = [margin(float(step)) for step in range(-count, count + 1)]
     known = [each for each in margins if each > -math.inf]
     if known and max(known) - min(known) < _MOVES_DB:
-        raise ValueError(f"{found[0].key} moves this margin by nothing")
+        raise ValueError(f"{name} moves this margin by nothing")
     intervals, begin = [], None
     for place, here in enumerate(margins):
         step = float(place - count)

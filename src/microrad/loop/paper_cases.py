@@ -56,7 +56,7 @@ class Run:
         """In words, what the amplifier held back during the run, or nothing."""
         c, samples = self.trace.counts, self.trace.time_s.size
         if c.saturated:
-            return f"the amplifier's limits ({100 * c.saturated / samples:.0f} % of the samples)"
+            return f"the amplifier's limits ({c.saturated} of {samples} samples)"
         return "the amplifier's slew limit" if c.slew_limited else ""
 
     @property

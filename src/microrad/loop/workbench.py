@@ -1,7 +1,7 @@
 """A sampled loop around a mirror by itself: no mission, numbers in, margins, runs and statistics out."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral
@@ -166,7 +166,7 @@ class Loop:
 
     mirror: Mirror
     rate_hz: float
-    vibration: Disturbance | tuple[Disturbance, ...] = ()
+    vibration: Disturbance | Sequence[Disturbance] = ()
     sensor_noise_rad: float = 0.0
     delay_s: float = 0.0
     sensor_delay_s: float = 0.0
@@ -222,7 +222,7 @@ class Loop:
     @cached_property
     def parts(self) -> PointingLoop:
         """The loop as the simulation takes it."""
-        given = self.vibration if isinstance(self.vibration, tuple) else (self.vibration,)
+        given = (self.vibration,) if isinstance(self.vibration, Disturbance) else tuple(self.vibration)
         period = 1.0 / self.rate_hz
         step = period / self.steps_per_sample
         for name in ("delay_s", "sensor_delay_s"):

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaH
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
-from microrad.core.units import UnitError, format_quantity, kind_of, parse_quantity
+from microrad.core.units import UnitError, format_input, format_quantity, kind_of, parse_quantity
 
 MOST_ITEMS = 1000
 """Items of a list beyond which it is taken for a mistake."""
@@ -161,6 +161,12 @@ class Whole(Quantity):
         """Why a number is not allowed, or nothing."""
         return "is not whole" if number != int(number) else Quantity.out_of_bounds(self, number)
 
+    def check(self, name: str, value: float, why: str = "") -> None:
+        """As that of `Quantity`; a number that is not whole is refused as such."""
+        if value % 1.0 and math.isfinite(value):
+            raise ValueError(f"{name} is {format_input(value, '')}: it must be whole, {self.limits}")
+        Quantity.check(self, name, value, why)
+
     @property
     def example(self) -> str:
         """A number within the bounds."""
@@ -172,7 +178,7 @@ class Whole(Quantity):
         return f"a whole number without quotes, from {self._show(self.least or 0)} to {self._show(self.most or 0)}"
 
     def _show(self, number: float) -> str:
-        return str(int(number))
+        return Quantity._show(self, number) if number % 1 else str(int(number))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """A whole number with its bounds."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from microrad import link
-from microrad.core.units import format_quantity
+from microrad.core.units import format_beyond
 from microrad.link import pointing
 from microrad.link.error_budget.assembly import Judged, PointingErrorBudget
 from microrad.link.pointing.outage import Performance
@@ -194,14 +194,14 @@ def _day_claims(day: day_study.DayStudy) -> list[Claim]:
         Claim(
             "abstract",
             "a line of sight in each of about 15 orbits a day",
-            f"the relay rises {a_day:.3g} times a day",
+            f"the relay rises {format_beyond(a_day, 14.0 if a_day < 15.0 else 16.0, '', 3)} times a day",
             _agrees(14.0 <= a_day <= 16.0, days >= 1.0),
             "orbit, slot and grazing height are assumptions: the paper prints none",
         ),
         Claim(
             "section 2.2",
             "about 45 minutes for each session",
-            "no contact is seen whole" if np.isnan(minutes) else f"{minutes:.1f} min (median)",
+            "no contact is seen whole" if np.isnan(minutes) else f"{format_beyond(minutes, 45.0, 'min', 3)} (median)",
             _agrees(minutes >= 45.0, not np.isnan(minutes)),
             "what the geometry allows; the session is shorter by acquisition, and by what the relay does not grant",
         ),
@@ -228,7 +228,7 @@ def _day_claims(day: day_study.DayStudy) -> list[Claim]:
 def _minutes(time_s: float) -> str:
     if np.isinf(time_s):
         return "never"
-    return format_quantity(time_s / 60.0, "min", 2) if time_s >= 60.0 else f"{time_s:.2g} s"
+    return format_beyond(time_s / 60.0, 1.0, "min", 2) if time_s >= 60.0 else f"{time_s:.2g} s"
 
 
 def _link_claims() -> tuple[Claim, ...]:
@@ -283,9 +283,8 @@ def _travel_claim(e: Evidence) -> Claim:
     reach = 2.0 * hysteresis.output_amplitude(e.summary.model, span / 2.0)
     why = f"what the hysteresis model gives over a drive range of {span:.4g} V; the rest is drive or gain not printed"
     agrees = "yes" if reach >= CLAIMED_TRAVEL_RAD else "no"
-    return Claim(
-        "section 3.2", "travel of 2.5 mrad", f"{reach * 1e3:.2f} mrad within the amplifier's range", agrees, why
-    )
+    ours = f"{format_beyond(reach, CLAIMED_TRAVEL_RAD, 'rad', 3)} within the amplifier's range"
+    return Claim("section 3.2", "travel of 2.5 mrad", ours, agrees, why)
 
 
 def _linear_claim(s: mirror_summary.Summary) -> Claim:

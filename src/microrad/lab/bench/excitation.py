@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from microrad.core.arrays import Floats, Integers
-from microrad.core.units import format_input, format_limit, format_quantity
+from microrad.core.units import format_beyond, format_input, format_limit, format_quantity, plain
 from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
 
@@ -127,7 +127,7 @@ def logarithmic_chirp(
         raise DesignError(name, Problem("duration", reason, f"at least {least}, or a higher start"))
     growth = math.log(stop_hz / start_hz) / duration_s
     phase = 2 * math.pi * start_hz * np.expm1(growth * np.arange(samples) / limits.rate_hz) / growth
-    problems = _too_fast(limits, "stop", stop_hz)
+    problems = [*_too_fast(limits, "start", start_hz), *_too_fast(limits, "stop", stop_hz)]
     drive = _fitted(limits, name, ("amplitude", amplitude_v), np.sin(phase)[:, None], offset_v, problems)
     return Excitation(name, _on_axis(limits, name, drive, offset_v, axis), limits.rate_hz, offset_v)
 
@@ -286,7 +286,7 @@ def samples_in(limits: Limits, name: str, key: str, seconds: float) -> int:
     """
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
     if seconds > most:
-        reason = f"makes a record of {format_quantity(seconds, 's')} at {format_quantity(limits.rate_hz, 'Hz')}"
+        reason = f"makes a record of {format_beyond(seconds, most, 's')} at {format_input(limits.rate_hz, 'Hz')}"
         expected = f"at most {format_limit(most, 's')} ({MOST_SAMPLES / 1e6:g} million samples), or a lower rate"
         raise DesignError(name, Problem(key, reason, expected))
     return max(round(seconds * limits.rate_hz), 1)
@@ -297,8 +297,9 @@ def _too_fast(limits: Limits, key: str, highest_hz: float) -> list[Problem]:
     if highest_hz * fewest <= limits.rate_hz * (1 + _ROUNDING):
         return []
     reason = (
-        f"reaches {format_quantity(highest_hz, 'Hz')}, {limits.rate_hz / highest_hz:.3g} samples a period at "
-        f"{format_quantity(limits.rate_hz, 'Hz')} where limits.samples_per_period asks for {fewest:g}"
+        f"reaches {format_beyond(highest_hz, limits.rate_hz / fewest, 'Hz')}, "
+        f"{format_beyond(limits.rate_hz / highest_hz, fewest, '', 3)} samples a period at "
+        f"{format_input(limits.rate_hz, 'Hz')} where limits.samples_per_period asks for {plain(fewest, 6)}"
     )
     most, rate = format_limit(limits.rate_hz / fewest, "Hz"), format_limit(highest_hz * fewest, "Hz", least=True)
     return [Problem(key, reason, f"at most {most}, or a rate of at least {rate}")]
@@ -320,9 +321,10 @@ def _fitted(
     most = min((space / part for space, part, _, _ in room.values() if part > 0.0), default=math.inf)
     for limit, (space, part, unit, base) in room.items():
         if size * part > space * (1 + _ROUNDING) and space >= 0.0:
-            reached = base - size * part if limit.endswith("min") else base + size * part
-            allowed = base - space if limit.endswith("min") else base + space
-            reason = f"takes the drive to {format_quantity(reached, unit)}, {limit} is {format_quantity(allowed, unit)}"
+            sign = -1.0 if limit.endswith("min") else 1.0
+            allowed = base + sign * space
+            reached = format_beyond(base + sign * size * part, allowed, unit)
+            reason = f"takes the drive to {reached}, {limit} is {format_input(allowed, unit)}"
             found.append(Problem(key, reason, f"at most {format_limit(most if most > _NOTHING else 0.0, 'V')}"))
     if found:
         raise DesignError(name, *found)
@@ -333,9 +335,7 @@ def _outside(limits: Limits, key: str, levels: Floats) -> list[Problem]:
     slack = _ROUNDING * (limits.drive_max_v - limits.drive_min_v)
     bad = levels[(levels < limits.drive_min_v - slack) | (levels > limits.drive_max_v + slack)]
     span = f"{format_input(limits.drive_min_v, 'V')} to {format_input(limits.drive_max_v, 'V')}"
-    reason = (
-        f"has {format_quantity(float(bad[0]), 'V')}, outside limits.drive_min to limits.drive_max" if bad.size else ""
-    )
+    reason = f"has {format_input(float(bad[0]), 'V')}, outside limits.drive_min to limits.drive_max" if bad.size else ""
     return [Problem(key, reason, span)] if bad.size else []
 
 
@@ -346,7 +346,7 @@ def _too_steep(limits: Limits, rise: int, levels: Floats) -> list[Problem]:
         return []
     fewest = min(largest / limits.slew_v_s * limits.rate_hz, 1e15)
     needed = format_limit(math.ceil(fewest - _WHOLE) / limits.rate_hz, "s", least=True)
-    shown, most = format_quantity(slew, "V/s"), format_quantity(limits.slew_v_s, "V/s")
+    shown, most = format_beyond(slew, limits.slew_v_s, "V/s"), format_input(limits.slew_v_s, "V/s")
     return [Problem("rise", f"makes the largest step one of {shown}, limits.slew is {most}", f"at least {needed}")]
 
 
@@ -369,8 +369,9 @@ def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int
         return block
     ratio = Fraction(limits.rate_hz / freq_hz).limit_denominator(1000)
     fits = ratio > 0 and abs(ratio.denominator * limits.rate_hz / freq_hz - ratio.numerator) <= _WHOLE
-    near = format_quantity(periods * limits.rate_hz / max(block, 1), "Hz", 9)
-    reason = f"of {format_quantity(freq_hz, 'Hz')}: {periods} of them fill {exact:.6g} samples, no whole number"
+    near = _near(periods * limits.rate_hz / max(block, 1), "Hz", _WHOLE / max(block, 1))
+    filled = _near(exact, "samples", abs(exact - block) / exact)
+    reason = f"of {format_quantity(freq_hz, 'Hz')}: {periods} of them fill {filled}, no whole number"
     expected = f"a multiple of {ratio.denominator}, or a frequency of {near}" if fits else f"a frequency of {near}"
     raise DesignError(name, Problem("periods", reason, expected))
 
@@ -381,8 +382,15 @@ def _whole_period(limits: Limits, name: str, period_s: float) -> int:
     length = round(exact)
     if length >= 2 and abs(exact - length) <= _WHOLE:
         return length
-    near = format_quantity(max(length, 2) / limits.rate_hz, "s", 9)
-    raise DesignError(name, Problem("period", f"is {exact:.6g} samples, no whole number of at least 2", near))
+    near = _near(max(length, 2) / limits.rate_hz, "s", _WHOLE / max(length, 2))
+    filled = _near(exact, "sample" + "s" * (exact != 1.0), abs(exact - length) / max(exact, _WHOLE))
+    raise DesignError(name, Problem("period", f"is {filled}, no whole number of at least 2", near))
+
+
+def _near(value: float, unit: str, share: float) -> str:
+    """A quantity in six digits, or as many more as leave it well within a share of itself."""
+    close = (n for n in range(6, 16) if math.isclose(float(f"{value:.{n}g}"), value, rel_tol=share / 2))
+    return format_quantity(value, unit, next(close, 15))
 
 
 def _harmonics(lines: Lines, name: str, rng: np.random.Generator) -> Integers:

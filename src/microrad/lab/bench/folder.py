@@ -17,7 +17,7 @@ from microrad.core.folder import MANIFEST, read_bytes, whole_folder
 from microrad.core.folder import check_folder as check
 from microrad.core.installing import advice
 from microrad.core.progress import Progress
-from microrad.lab.bench.plan import Plan, Record
+from microrad.lab.bench.plan import MAT73, Plan, Record
 from microrad.lab.bench.play import BenchError, play_records
 from microrad.lab.recording import Recording, read_recording
 
@@ -185,7 +185,7 @@ _WRITERS: dict[str, tuple[str, Callable[[Recording, Path], None]]] = {
     "lvm": (".lvm", _write_lvm),
     "tdms": (".tdms", _write_tdms),
     "mat": (".mat", _write_mat),
-    "mat73": ("-v73.mat", _write_mat73),  # beside a version 5 of the same record
+    "mat73": (f"{MAT73}.mat", _write_mat73),
     "npz": (".npz", _write_npz),
     "hdf5": (".h5", _write_hdf5),
 }

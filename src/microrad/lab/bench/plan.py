@@ -7,7 +7,7 @@ Every quantity is text with a unit in the file (`duration = "10 s"`) and an SI f
 import difflib
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -37,6 +37,8 @@ from microrad.mission.toml import Document, Fault, MissionError, UnreadableError
 
 FORMATS = ("csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5")
 """File formats that the bench writes; mat is MATLAB's version 5, mat73 its version 7.3."""
+MAT73 = "-v73"
+"""What the name of a file of MATLAB's version 7.3 has behind that of the record, beside a version 5 of the same."""
 
 
 MOST_AXES = 4
@@ -493,9 +495,14 @@ def _note(document: Document, name: str, error: DesignError) -> None:
         document.fault(key, clipped(found.value) if found else "", problem.reason, problem.expected)
 
 
-def _note_same_names(document: Document, names: Iterable[str]) -> None:
+def _note_same_names(document: Document, names: Sequence[str]) -> None:
     seen: set[str] = set()
     for name in names:
         if name.lower() in seen:
             document.fault("excitation", "", f'makes two records named "{name}"', "names that stay different")
         seen.add(name.lower())
+    formats = document.data.get("formats")
+    for name in names if isinstance(formats, list) and "mat" in formats and "mat73" in formats else ():
+        if name.lower() + MAT73 in seen:
+            reason = f'writes two records to "{name}{MAT73}.mat", as mat and as mat73'
+            document.fault("excitation", "", reason, "names that stay different, or one of the two formats")

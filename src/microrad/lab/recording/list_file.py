@@ -3,6 +3,7 @@
 What stands above the tables holds for all recordings that do not say otherwise. Every fault is reported at once.
 """
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -229,12 +230,17 @@ def _note_overlaps(document: Document, entries: Mapping[str, RecordingTable]) ->
     for name in [name for name in entries if name not in fitted]:
         mine = entries[name]
         for other, theirs in fitted.items():
-            apart = mine.file != theirs.file or mine.output_file != theirs.output_file
-            if not apart and _begins_before_end(mine, theirs) and _begins_before_end(theirs, mine):
+            files = [_files(document.path.parent, each) for each in (mine, theirs)]
+            if files[0] == files[1] and _begins_before_end(mine, theirs) and _begins_before_end(theirs, mine):
                 reason = f"takes samples for validation that [recording.{other}] fits"
                 document.fault(
                     f"recording.{name}", "", reason, "two parts of the file (from, to) without common samples"
                 )
+
+
+def _files(folder: Path, entry: RecordingTable) -> tuple[str, str]:
+    """The files of drives and outputs, however they are spelled."""
+    return os.path.realpath(folder / entry.file), os.path.realpath(folder / (entry.output_file or entry.file))
 
 
 def _begins_before_end(one: RecordingTable, other: RecordingTable) -> bool:

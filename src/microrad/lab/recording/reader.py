@@ -252,7 +252,7 @@ def read_signal(path: str | Path, channel: Column | None = None, rate_hz: float 
     if channel is None:
         found = [index for index, name in enumerate(source.names) if not is_time_name(name)]
         if len(found) != 1:
-            listed = ", ".join(f"'{name}'" for name in source.names[:10])
+            listed = ", ".join(f"'{source.names[index]}'" for index in found[:10]) or "none"
             raise RecordingError(
                 f"{path}: the file has {len(found)} channels beside its time ({listed}); name the one."
             )
@@ -481,7 +481,8 @@ def samples_of(where: str, part_s: Part, rate_hz: float, samples: int) -> slice:
         RecordingError: If the part is empty or reaches beyond the recording.
     """
     first_s, last_s = part_s
-    first, last = round(first_s * rate_hz), samples if last_s is None else round(last_s * rate_hz)
+    ends = (first_s * rate_hz, samples if last_s is None else last_s * rate_hz)
+    first, last = (round(end) if math.isfinite(end) else -1 for end in ends)
     if not 0 <= first < last <= samples:
         raise RecordingError(
             f"{where}: from {first_s:g} s to {'the end' if last_s is None else f'{last_s:g} s'} is no part of a "

@@ -129,10 +129,10 @@ def multisine_recordings(
         RecordingError: If the shapes do not agree, or for anything that cannot be relied upon.
     """
     u, y = (np.asarray(a) for a in (drive, output))
-    if u.ndim != 4 or y.ndim != 4 or (u.shape[0], *u.shape[2:]) != (y.shape[0], *y.shape[2:]):
+    if u.ndim != 4 or y.ndim != 4 or (u.shape[0], *u.shape[2:]) != (y.shape[0], *y.shape[2:]) or not u.shape[2]:
         raise RecordingError(
             f"{name}: drive has shape {u.shape} and output {y.shape}; give (samples, channels, realisations, periods) "
-            "with the same samples, realisations and periods."
+            "with the same samples, realisations and periods, at least one of each."
         )
     found = tuple(
         recording_from_arrays(
@@ -201,6 +201,7 @@ def _check_shapes(drive: _Array, output: _Array) -> None:
             )
 
 
+@np.errstate(invalid="ignore", over="ignore")  # samples that are no numbers, or too large, are refused later
 def _check_periods(where: str, drive: _Array) -> None:
     """Raises RecordingError if a drive is not the same in each period: then another axis was called periods."""
     values = drive.values - drive.values.mean(axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.core.units import format_quantity
+from microrad.core.units import format_input, format_limit, format_quantity
 from microrad.mission.fields import Bounded, Quantity, Share
 
 OffAxis = Annotated[float, Share("rad", below=math.pi / 2), "an angle from the line of sight is meant"]
@@ -218,8 +218,8 @@ class StepStare(Bounded):
         Bounded.__post_init__(self)
         if self.dwell_s < self.detector.detection_time_s * (1.0 - 1e-9):
             raise ValueError(
-                f"the dwell of {format_quantity(self.dwell_s, 's')} is shorter than the detection time of"
-                f" {format_quantity(self.detector.detection_time_s, 's')}: dwell at least that long"
+                f"the dwell of {format_input(self.dwell_s, 's')} is shorter than the detection time of"
+                f" {format_limit(self.detector.detection_time_s, 's', least=True)}: dwell at least that long"
             )
 
     @property
@@ -305,8 +305,8 @@ def _check_speed(search: Search, detector: Detector, speed_rad_s: float) -> None
     most = 2.0 * search.beam_radius_rad / detector.detection_time_s
     if speed_rad_s > most * (1.0 + 1e-9):
         raise ValueError(
-            f"at {format_quantity(speed_rad_s, 'rad/s')} the beam crosses the target faster than the detection time of"
-            f" {format_quantity(detector.detection_time_s, 's')}: scan at {format_quantity(most, 'rad/s')} or slower"
+            f"at {format_input(speed_rad_s, 'rad/s')} the beam crosses the target faster than the detection time of"
+            f" {format_quantity(detector.detection_time_s, 's')}: scan at {format_limit(most, 'rad/s')} or slower"
         )
 
 

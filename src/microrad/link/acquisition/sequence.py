@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import SPEED_OF_LIGHT_M_S, format_input, format_limit
 from microrad.link.acquisition.scan import Duration, DurationOrZero, Probability
 from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
 from microrad.mission.fields import Bounded, Quantity, Whole
@@ -41,8 +41,8 @@ class Stage:
         _TIME.check(f'the time-out of the stage "{self.name}"', self.failure_s)
         if self.failure_s < self.longest_s:
             raise ValueError(
-                f'the stage "{self.name}" lasts {format_quantity(self.longest_s, "s")} and its time-out is'
-                f" {format_quantity(self.failure_s, 's')}: the time-out must not be shorter"
+                f'the stage "{self.name}" lasts {format_limit(self.longest_s, "s", least=True)} and its time-out is'
+                f" {format_input(self.failure_s, 's')}: the time-out must not be shorter"
             )
 
     @property

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.units import format_input, format_limit
 from microrad.mission.fields import Quantity
 
 _MOST = 4096  # times kept; more are merged into equal bins, each at its mean
@@ -48,8 +49,8 @@ class TimeDistribution:
         """
         if not 0.0 < probability <= self.probability * (1.0 + 1e-12):
             raise ValueError(
-                f"no time has the probability {probability:g}: it must lie above 0 and be at most"
-                f" {self.probability:g}, the probability of success"
+                f"no time has the probability {format_input(probability, '')}: it must lie above 0 and be at most"
+                f" {format_limit(self.probability, '')}, the probability of success"
             )
         index = int(np.searchsorted(np.cumsum(self.weight), probability * (1.0 - 1e-12)))
         return float(self.time_s[min(index, self.time_s.size - 1)])

@@ -371,14 +371,13 @@ class Writer:
         if turbulent is None or turbulent.direction != UPLINK:
             return ()
         r0 = format_quantity(turbulent.path.fried_m, "m", 3)
-        table = self.shared.channel
-        modes = 0 if table is None or table.turbulence is None else table.turbulence.corrected_modes
+        modes, source = self._corrected()
         basis = f"12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = {r0}"
         regime = "mean power on the axis, wander in it (Andrews and Phillips 2005)"
         if modes:
             basis += f", or what {modes} corrected modes and the point-ahead angle leave, if that is less"
         value = 0.0 - turbulent.spread_db
-        return (Line(SPREAD_LOSS, value, "dB", basis, source_of_air(self.sources), regime, _both(*turbulent.doubts)),)
+        return (Line(SPREAD_LOSS, value, "dB", basis, source, regime, _both(*turbulent.doubts)),)
 
     def wavefront(self, turbulent: Turbulent | None, into: str) -> tuple[Line, ...]:
         """Line of what a fibre or detector takes less of a turbulent wavefront.
@@ -390,9 +389,18 @@ class Writer:
         if turbulent is None or not into or turbulent.direction == UPLINK:
             return ()
         r0 = format_quantity(turbulent.path.fried_m, "m", 3)
+        modes, source = self._corrected()
         basis, regime = f"mean power into the {into}, r0 = {r0}", "Kolmogorov's turbulence, long exposure"
+        if modes:
+            basis, regime = f"{basis}, {modes} modes corrected", "Kolmogorov's turbulence, what correction leaves of it"
         value = 0.0 - turbulent.wavefront_db
-        return (Line(WAVEFRONT_LOSS, value, "dB", basis, source_of_air(self.sources), regime),)
+        return (Line(WAVEFRONT_LOSS, value, "dB", basis, source, regime),)
+
+    def _corrected(self) -> tuple[int, str]:
+        """How many modes of the wavefront are corrected, and where the air and that come from."""
+        table = self.shared.channel
+        modes = 0 if table is None or table.turbulence is None else table.turbulence.corrected_modes
+        return modes, source_of_air(self.sources, *(["corrected_modes"] if modes else []))
 
     def fade(self, turbulent: Turbulent | None, loss_db: float, alone: bool) -> tuple[Line, ...]:
         """Line of the fades of the air.

@@ -97,8 +97,8 @@ class Pupil(Bounded):
         Quantity("", most=MOST_TILT).check("truncation times shift", self.truncation * self.shift, _TILTED)
         most = self.wavelength_m * MOST_WAVES
         for each in fields(self.aberrations):
-            size = abs(getattr(self.aberrations, each.name))
-            Quantity("m", most=most).check(each.name, size, "half a wavelength, beyond which the light has no core")
+            rule, value = Quantity("m", least=-most, most=most), getattr(self.aberrations, each.name)
+            rule.check(each.name, value, "half a wavelength, beyond which the light has no core")
 
     @property
     def is_round(self) -> bool:

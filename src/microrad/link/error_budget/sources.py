@@ -137,8 +137,10 @@ class ErrorSource:
                 raise ValueError(f"{self.name}: errors apart by axis need gains; give a source for each axis instead")
             return
         gains = np.asarray(self.transfer, dtype=float)
-        if gains.ndim != 1 or not gains.size or not np.isfinite(gains).all():
+        if gains.ndim != 1 or not gains.size:
             raise ValueError(f"{self.name}: its gains have the shape {gains.shape}; give a finite one for each axis")
+        if not np.isfinite(gains).all():
+            raise ValueError(f"{self.name}: its gains are {gains.tolist()}; give a finite one for each axis")
 
     @property
     def axes(self) -> int:

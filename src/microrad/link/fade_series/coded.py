@@ -222,7 +222,7 @@ def _interval(values: Floats) -> Interval:
 def _share(lost: NDArray[np.bool_]) -> Interval:
     """The share of words that are lost, with its interval."""
     parts = _parts(lost.astype(np.float64))
-    return Interval(float(np.mean(lost)), *clustered_band(parts, lost.size // _CLUSTERS, CONFIDENCE))
+    return Interval(float(np.mean(lost)), *clustered_band(parts, max(lost.size // _CLUSTERS, 1), CONFIDENCE))
 
 
 def _parts(values: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from microrad.core.units import format_limit
 from microrad.lab.recording import RecordingError, read_signal
 from microrad.link.fade_series.records import LEAST_SAMPLES, FadeSeries, FadeSeriesError, Normalisation, Unit, check
 from microrad.mission.fields import Quantity
@@ -45,8 +46,9 @@ def read_fade_series(
     try:
         if path.is_file() and path.stat().st_size > MOST_BYTES:
             raise FadeSeriesError(
-                f"{called}: the file has {path.stat().st_size / 1e6:.0f} MB and at most {MOST_BYTES / 1e6:.0f} MB are "
-                "read; cut out a part, or keep every n-th sample if its fades allow that."
+                f"{called}: the file has {format_limit(path.stat().st_size, 'B', least=True)} and at most "
+                f"{MOST_BYTES / 1e6:.0f} MB are read; cut out a part, or keep every n-th sample if its fades allow "
+                "that."
             )
         found = read_signal(path, channel, None if period_s is None else 1.0 / period_s)
     except RecordingError as error:

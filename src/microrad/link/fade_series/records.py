@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats, reals
 from microrad.core.errors import MicroradError
-from microrad.core.units import format_quantity
+from microrad.core.units import format_limit, format_quantity
 from microrad.mission.fields import Quantity
 
 Unit = Literal["linear", "dB"]
@@ -124,8 +124,8 @@ class FadeSeries:
         """
         if self.duration_s < needed_s * (1.0 - 1e-9):
             raise FadeSeriesError(
-                f"{self.source}: the series lasts {format_quantity(self.duration_s, 's')} and {what} "
-                f"{format_quantity(needed_s, 's')}; give a series of many times that, or shorten the latter."
+                f"{self.source}: the series lasts {format_limit(self.duration_s, 's')} and {what} "
+                f"{format_limit(needed_s, 's', least=True)}; give a series of many times that, or shorten the latter."
             )
 
     def fades(self, level: float) -> Fades:
@@ -167,8 +167,9 @@ class FadeSeries:
         found = self.fades(level)
         if found.unresolved > MOST_UNRESOLVED:
             raise FadeSeriesError(
-                f"{self.source}: the series is sampled slower than its fades: {100 * found.unresolved:.0f} % of the "
-                f"time below {10.0 * math.log10(level):.1f} dB is in fades of a single sample, "
+                f"{self.source}: the series is sampled slower than its fades: "
+                f"{format_limit(100 * found.unresolved, '', 3, least=True)} % of the time below "
+                f"{10.0 * math.log10(level):.1f} dB is in fades of a single sample, "
                 f"{format_quantity(self.period_s, 's')}, and at most {100 * MOST_UNRESOLVED:g} % may be; give a series "
                 "that is sampled faster."
             )
@@ -192,7 +193,7 @@ def _linear(given: Floats, source: str, unit: Unit) -> Floats:
         bad &= ~np.isneginf(given)  # no light
     if np.any(bad):
         row = int(np.argmax(bad))
-        wanted = f"finite, 0 or above and at most {_MOST:g}" if unit == "linear" else f"at most {_MOST_DB:g} dB"
+        wanted = f"finite, 0 or above and at most {_MOST:g}" if unit == "linear" else f"a number up to {_MOST_DB:g} dB"
         hint = ' (unit "dB" if these are levels)' if unit == "linear" and given[row] < 0.0 else ""
         raise FadeSeriesError(
             f"{source}: sample {row} is {given[row]:g}, and {int(np.sum(bad))} such samples are in it: a power must be "

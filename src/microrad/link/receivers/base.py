@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from microrad.core import capacity
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_limit, format_quantity
 from microrad.link.gains import checked, photon_energy_j
 from microrad.mission.fields import Bounded, Quantity, Share
 
@@ -229,8 +229,8 @@ class Receiver(Bounded, ABC):
             raise RateError(
                 f"the data rate is {format_quantity(highest, 'bit/s')}, which is "
                 f"{format_quantity(float(symbols.max()), 'Hz')} of symbols or slots on the line: the receiver takes "
-                f"{format_quantity(limit, 'Hz')}, so at most "
-                f"{format_quantity(highest * limit / float(symbols.max()), 'bit/s')} of data"
+                f"{format_limit(limit, 'Hz')}, so at most "
+                f"{format_limit(highest * limit / float(symbols.max()), 'bit/s')} of data"
             )
         return rates
 

@@ -9,6 +9,7 @@ import numpy as np
 from microrad.core import phase_error
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
+from microrad.core.units import format_limit
 from microrad.link.receivers import base
 from microrad.mission.fields import Quantity, Whole
 
@@ -79,7 +80,7 @@ class _PhaseKeyed(base.Receiver):
             most = phase_error.largest_rms_rad(self.bit_error_ratio, self._BITS)
             raise ValueError(
                 f"{type(self).__name__}.phase_error_rad is {self.phase_error_rad:g} rad: no power reaches a bit error "
-                f"ratio of {self.bit_error_ratio:g} above {most:.3g} rad rms"
+                f"ratio of {self.bit_error_ratio:g} above {format_limit(most, '', 3)} rad rms"
             )
 
     @property

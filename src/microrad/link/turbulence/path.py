@@ -55,9 +55,12 @@ class SlantPath(Bounded):
         return 2.0 * math.pi / self.wavelength_m
 
     def layers(self) -> tuple[Floats, Floats, Floats]:
-        """Heights, distances from the station along the path (both m), and Cn2 times each layer's length (m^(1/3))."""
-        height, weight = heights()
+        """Heights, distances from the station along the path (both m), and Cn2 times each layer's length (m^(1/3)).
+
+        None lies beyond the satellite.
+        """
         longer = 1.0 / math.sin(self.elevation_rad)
+        height, weight = (each[heights()[0] * longer < self.range_m] for each in heights())
         return height, height * longer, self.profile.strength(height) * weight * longer
 
     def moment(self, power: float) -> float:

@@ -261,7 +261,7 @@ def _tuned(search: Search, trial: Trial) -> Tuned:
     modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)
     asked = search.specification
     bound = [MARGIN] if modulus <= 1.01 * asked.modulus_margin else []
-    bound += [BANDWIDTH] if bandwidth <= 1.01 * asked.bandwidth_hz else []
+    bound += [BANDWIDTH] if 0.0 < asked.bandwidth_hz >= bandwidth / 1.01 else []
     for i, p in enumerate(search.parameters):
         bound += [f"{p.name} at its {side}" for side in _pressed(search, trial, i)]
     return Tuned(

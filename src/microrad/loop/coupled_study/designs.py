@@ -329,7 +329,7 @@ def _designed(
             margins = [_margins(plant, made) for plant in of]
             least = min(each.modulus for each in margins)
         except ValueError as error:  # beyond what the family can have
-            refused, least = str(error), math.inf
+            refused, least = refused or str(error), math.inf
         if asked <= least < math.inf:
             found = made, values, margins
             if tuned_for == asked or least <= (1.0 + ENOUGH) * asked:

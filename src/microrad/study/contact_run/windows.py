@@ -55,7 +55,7 @@ def plan(start_s: float, end_s: float, settings: Settings) -> tuple[tuple[float,
         settings: Number and length of the windows wanted.
     """
     length = min(settings.window_s, end_s - start_s)
-    count = min(settings.windows, max(int((end_s - start_s) / settings.window_s), 1))
+    count = min(settings.windows, max(int((end_s - start_s) / settings.window_s + 1e-9), 1))
     return tuple((float(begin), length) for begin in np.linspace(start_s, end_s - length, count))
 
 

@@ -140,7 +140,8 @@ def held_out_warnings(
         outside += int(np.sum((held_out < low - margin) | (held_out > high + margin)))
     if not outside:
         return []
-    return [f"{outside} held-out samples lie outside the fitted drive range; the held-out residual judges them too."]
+    lie, them = ("sample lies", "it") if outside == 1 else ("samples lie", "them")
+    return [f"{outside} held-out {lie} outside the fitted drive range; the held-out residual judges {them} too."]
 
 
 def score_warnings(score: Score, line: Score) -> list[str]:

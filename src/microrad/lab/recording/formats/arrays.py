@@ -25,7 +25,7 @@ STEP_NAMES = frozenset({
 # fmt: on
 UNIT_NAMES = ("units", "unit", "unit_string")
 _MOST_COLUMNS = 10_000  # a few bytes may claim millions
-_INDEXED = re.compile(r"(.*)\[([\d,\s]*)\]")
+_INDEXED = re.compile(r"(.*)\[\s*(\d{1,9}(?:\s*,\s*\d{1,9})*)\s*\]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ def indexed(source: Container, variables: list[Variable], wanted: int | str) -> 
     match = _INDEXED.fullmatch(wanted) if isinstance(wanted, str) else None
     if match is None:
         return None
-    index = tuple(int(part) for part in match.group(2).split(",") if part.strip())
+    index = tuple(int(part) for part in match.group(2).split(","))
     for variable in variables:
         if variable.name != match.group(1) and variable.name.rsplit("/", 1)[-1] != match.group(1):
             continue
