@@ -465,3 +465,9 @@ def test_a_response_that_a_hold_cannot_have_is_told_in_full(hold, rate_hz, last,
         assert told(vector_fitting._check, freq, 2, data, hold, rate_hz) == message
     else:
         assert vector_fitting._check(freq, 2, data, hold, rate_hz) is None
+
+
+def test_pairs_that_change_places_have_not_moved():
+    one, two = (np.array([-2.0, *pairs, *np.conj(pairs)]) for pairs in ([-3 + 4j, -1 + 90j], [-1 + 90j, -3 + 4j]))
+    assert vector_fitting._moved_by(one, two) == 0.0
+    assert vector_fitting._moved_by(one, one * 1.01) > 0.01

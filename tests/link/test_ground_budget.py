@@ -579,7 +579,8 @@ def test_links_to_a_station_unlike_each_other_have_these_numbers(unlike, of, cas
         ("Turbulence spread loss (dB): 12 lg(1 + (D0 / r0)^(5/3)), D0 = sqrt(8) W0, r0 = 111 mm, or what 7 "
          "corrected modes and the point-ahead angle leave, if that is less | mission file, line 33; mission "
          "file, line 34; mission file, line 38 | mean power on the axis, wander in it (Andrews and Phillips 2005) | "
-         "the point-ahead angle is 7.8 isoplanatic angles: adaptive optics measures other air than the beam goes through"),
+         "the point-ahead angle is 7.8 isoplanatic angles: adaptive optics measures other air than the beam goes "
+         "through"),
         ("Turbulence fade (dB): scintillation index 0.19, wander of 6.08 µrad rms; what it adds to the pointing "
          "loss, all together exceeded for 1 % of the time | mission file, line 33; mission file, line 34; "
          "mission file, line 35; mission file, line 62 | any strength, by its index | "),

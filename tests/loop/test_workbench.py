@@ -188,7 +188,7 @@ def test_a_mirror_of_parts_answers_and_refuses():
         ([1.0, 0.0], [1.0, 2.0, 3.0]),
         ([1.0], [0.0, 1.0, 1.0]),
     ):
-        with pytest.raises(ValueError, match="give one that is proper and stable"):
+        with pytest.raises(ValueError, match="give one that is strictly proper and stable"):
             Mirror.of(1e-6, numerator, denominator)
 
 

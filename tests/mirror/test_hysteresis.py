@@ -769,6 +769,21 @@ def test_the_size_of_h_goes_to_the_kernel_where_an_exponent_needs_it(changes, si
             "inverse; identify it again with more samples near the reversals",
         ),
         (
+            PrandtlIshlinskii((), ()),
+            "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
+            "inverse; identify it again with more samples near the reversals",
+        ),
+        (
+            PrandtlIshlinskii((0.0, 1.0, 2.0), (4e-5, -5e-5, 3e-5)),
+            "the slope of the Prandtl-Ishlinskii model turns, or is 0, at its threshold of 1 V, where the weights add "
+            "up to -1e-05 rad/V: it has no inverse; give weights whose sums keep the sign of the first one",
+        ),
+        (
+            PrandtlIshlinskii((0.0, 1.0, 2.0), (-4e-5, 2e-5, 2e-5)),
+            "the slope of the Prandtl-Ishlinskii model turns, or is 0, at its threshold of 2 V, where the weights add "
+            "up to 0 rad/V: it has no inverse; give weights whose sums keep the sign of the first one",
+        ),
+        (
             PrandtlIshlinskii((0.0, 1.0), (1e-5, 2e-5), polynomial_rad=(1e-6, 0.0, 0.0), reach_v=3.0),
             "the Prandtl-Ishlinskii model has a polynomial beside its plays, and the inverse knows plays alone; "
             "identify the axis without one",
@@ -793,3 +808,66 @@ def test_a_loop_says_its_frequency_its_samples_and_its_width(freq_hz, words):
     assert [found[name].attrs["long_name"] for name in ("drive", "output", "hysteresis")] == [
         *("drive about the bias", "output about the bias", "hysteresis h")
     ]
+
+
+@pytest.mark.parametrize("widening_s", [0.0, 1e-3])
+def test_an_operator_that_falls_has_the_inverse_of_its_mirror_image(widening_s):
+    rises, falls = (
+        PrandtlIshlinskii((0.0, 1.0, 2.0), weights, widening_s, 500.0)
+        for weights in ((4e-5, 1e-5, -2e-5), (-4e-5, -1e-5, 2e-5))
+    )
+    wanted = 2e-4 * np.sin(np.linspace(0.0, 20.0, 400))
+    assert_allclose(falls.inverse(wanted, 1e-3), -rises.inverse(wanted, 1e-3), rtol=1e-12)
+    left = falls.response(falls.inverse(wanted, 1e-3), 1e-3) - wanted
+    assert np.max(np.abs(left)) < (1e-15 if not widening_s else 4e-5)
+
+
+@pytest.mark.parametrize(("output_rad", "gain"), [(0.0, 4e-5), (1e-9, 4e-5), (4e-5, 4e-5), (9e-5, 4.5e-5), (inf, 5e-5)])
+def test_the_secant_gain_begins_with_that_at_rest(output_rad, gain):
+    assert hysteresis.secant_gain(PrandtlIshlinskii((0.0, 1.0), (4e-5, 1e-5)), output_rad) == pytest.approx(
+        gain, rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("model", [PrandtlIshlinskii((0.0, 1.0), (4e-5, 1e-5)), BoucWen(4e-5, 0, 0, 0, 0, 0)])
+@pytest.mark.parametrize("output_rad", [-1e-6, nan])
+def test_a_secant_gain_at_no_amplitude_is_refused(model, output_rad):
+    with pytest.raises(
+        ValueError, match=f"output_rad is {output_rad} rad: give an amplitude of the output, 0 or above"
+    ):
+        hysteresis.gain_only(model, output_rad)
+
+
+def test_an_operator_without_plays_has_no_gain_at_any_amplitude():
+    assert [hysteresis.secant_gain(PrandtlIshlinskii((), ()), y) for y in (0.0, 1e-6, inf)] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "settled", "slope", "wrong_way"),
+    [
+        ((1e-5, 0, 2e-6, 0, 0, 0), inf, 1.2e-5, 0.0),
+        ((1e-5, 0, -2e-6, 0, 0, 0), inf, 8e-6, 0.0),
+        ((1e-5, 0, -2e-5, 0, 0, 0), inf, -1e-5, inf),
+        ((1e-5, 0, 2e-6, 0, 0.5, -0.5), inf, inf, 0.0),
+        ((1e-5, 0, -2e-6, 0, 0.5, 0.5), inf, -inf, inf),
+        ((1e-5, 0, -2e-6, 0, 0, -0.5), 4e-6, 1e-5, 0.0),
+    ],
+)
+def test_h_without_a_decay_never_settles(parameters, settled, slope, wrong_way):
+    model = BoucWen(*parameters)
+    assert (model.settled_rad, model.wrong_way_rad) == pytest.approx((settled, wrong_way))
+    assert model.reversal_slope_rad_v() == pytest.approx(slope)
+    assert model.admissible == (slope >= 0.0)
+    assert model.admissible_rate_v_s == (inf if slope >= 0.0 else 0.0)
+
+
+def test_h_whose_exponent_leaves_it_no_decay_never_settles():
+    assert BoucWen(1e-5, 0, -2e-6, 0, 0, -0.5, exponent=2.0).settled_rad == inf
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("model", [BoucWen(0, 0, 0, 0, 0, 0), PrandtlIshlinskii((2.0,), (1e-5,))])
+def test_a_loop_whose_output_stands_still_is_not_wide(model):
+    loop = model.loop(1.0, 1.0)
+    assert loop.width == 0.0
+    assert repr(loop) == "<HysteresisLoop at 1 Hz: 500 samples, 0.00% wide>"

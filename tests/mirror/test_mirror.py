@@ -787,11 +787,18 @@ def test_a_softer_mirror_for_small_drives():
         ((5e-5, [1.0], [1e-8, nan, 1.0]), "rows of finite coefficients"),
         ((5e-5, [1j], [1e-8, 1e-4, 1.0]), "numerator of mirror 'mirror': no array of real numbers"),
         ((5e-5, [], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
-        ((5e-5, [1.0], [0.0, 1.0]), "a numerator of 1 and a denominator of 2 coefficients: give one that is proper"),
-        ((5e-5, [1.0], [1.0, 0.0]), "a denominator of 2 coefficients: give one that is proper and stable"),
+        (
+            (5e-5, [1.0], [0.0, 1.0]),
+            "a numerator of 1 and a denominator of 2 coefficients: give one that is strictly proper",
+        ),
+        ((5e-5, [1.0], [1.0, 0.0]), "a denominator of 2 coefficients: give one that is strictly proper and stable"),
         ((5e-5, [1.0, 0.0], [1.0, 1e4, 1e8]), "a numerator of 2 and .* and that passes a constant"),
         ((5e-5, [1.0, 1.0, 1.0], [1.0, 1.0]), "a numerator of 3 and a denominator of 2 coefficients: give one that"),
-        ((5e-5, [1.0, 2.0], [1.0, 1.0]), "numerator of order 1 over denominator of order 1: not strictly proper"),
+        ((5e-5, [1.0, 2.0], [1.0, 1.0]), "a numerator of 2 and a denominator of 2 coefficients: give one that"),
+        ((5e-5, [1.0, 2.0], [7.0]), "a numerator of 2 and a denominator of 1 coefficients: give one that"),
+        ((5e-5, [0.0], [7.0]), "a numerator of 1 and a denominator of 1 coefficients: give one that"),
+        ((5e-5, [1.0], [0.0]), "a numerator of 1 and a denominator of 1 coefficients: give one that"),
+        ((5e-5, [0.0, 0.0], [1.0, 1.0]), "a numerator of 2 .* and that passes a constant"),
         ((5e-5, [[1.0]], [1e-8, 1e-4, 1.0]), "rows of finite coefficients"),
     ],
 )
@@ -965,8 +972,8 @@ def test_a_transfer_function_that_is_negative_where_it_is_normalised_keeps_its_s
         (
             lambda: Mirror.of(PLAYS, [1.0], [1.0, 0.0, 3.0], name="wobbly"),
             "the linear part of mirror 'wobbly' has a numerator of 1 and a denominator of 3 coefficients: give one "
-            "that is proper and stable (every root of the denominator left of the imaginary axis) and that passes a "
-            "constant",
+            "that is strictly proper and stable (every root of the denominator left of the imaginary axis) and that "
+            "passes a constant",
         ),
         (
             lambda: Mirror.of(PLAYS, [1.0], [[1.0, 3.0]], name="square"),
@@ -1050,8 +1057,8 @@ def test_the_summary_of_a_mirror_with_faults_of_each_kind_word_by_word(tmp_path)
 
 
 IMPROPER = (
-    "the linear part of mirror 'm' has a numerator of {} and a denominator of {} coefficients: give one that is proper "
-    "and stable (every root of the denominator left of the imaginary axis) and that passes a constant"
+    "the linear part of mirror 'm' has a numerator of {} and a denominator of {} coefficients: give one that is "
+    "strictly proper and stable (every root of the denominator left of the imaginary axis) and that passes a constant"
 )
 ROWS = "mirror 'm': numerator and denominator have to be rows of finite coefficients"
 
@@ -1273,3 +1280,18 @@ def test_polynomials_of_any_gain_at_rest_have_that_of_the_hysteresis_with_creep_
     expected = hysteresis.slow_gain(PLAYS) * shape + 5e-6 / (1 + 0.2 * s)
     assert_allclose(m.frequency_response([0.0, 0.3])[:, 0, 0], expected, rtol=1e-9)
     assert (m.name, m.inverse, m.inverse_creep) == ("p", (PLAYS,), (Creep((5e-6,), (0.2,)),))
+
+
+def test_zeros_before_the_numerator_of_a_linear_part_are_no_powers():
+    long, short = (Mirror.of(1e-5, top, [1.0, 1.0]) for top in ([0, 0, 1], [1]))
+    for key in "ABCD":
+        assert getattr(long, key).tolist() == getattr(short, key).tolist()
+    assert Mirror.of(1e-5, [0, 2], [7]).A.shape == (0, 0)
+
+
+@pytest.mark.parametrize("bottom", [[1.0], [1.0, 1.0]])
+@pytest.mark.parametrize("constants", [(0.1, 0.2), (-0.1,)])
+def test_a_mirror_refuses_creep_whose_weights_do_not_fit_its_lags(bottom, constants):
+    words = "creep of 1 weights and the time constants .*: give as many weights, and time constants above 0"
+    with pytest.raises(ValueError, match=words):
+        Mirror.of(1e-5, [1.0], bottom, creep=Creep((1e-6,), constants))

@@ -41,8 +41,9 @@ class HysteresisLoop:
 
     @property
     def width(self) -> float:
-        """Share of the output's peak-to-peak that is hysteresis."""
-        return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
+        """Share of the output's peak-to-peak that is hysteresis; 0 where the output stands still."""
+        moves = float(np.ptp(self.output_rad))
+        return float(np.ptp(self.hysteresis_rad)) / moves if moves else 0.0
 
     def to_xarray(self) -> Dataset:
         """Drive, output and hysteresis by the sample of the period; frequency, width and ``clamped`` as attributes."""
@@ -251,11 +252,13 @@ class BoucWen(_FromRest):
         return self.alpha_1_v + self.beta_1_v * rising * sign + self.gamma_1_v * sign + self.eta_1_v * rising
 
     def settled_branch_rad(self, rising: float) -> float:
-        """Where h settles on a slow, long ramp of the drive that runs in one direction (1 up, -1 down)."""
+        """Where h settles on a slow, long ramp of the drive in one direction (1 up, -1 down); inf without a decay."""
         sign = rising * math.copysign(1.0, self.epsilon_rad_v)
         decay = self.decay_1_v(rising, sign)
         if self.epsilon_rad_v == 0.0:
             return 0.0
+        if decay == 0.0 or (self.alpha_1_v == 0.0 and self.exponent != 1.0):  # nothing holds h back
+            return sign * math.inf
         if self.exponent == 1.0:
             return sign * abs(self.epsilon_rad_v) / decay
         share = math.pow(self.alpha_1_v / decay, 1.0 / self.exponent)
@@ -288,10 +291,8 @@ class BoucWen(_FromRest):
 
     def _swing(self, choose: Callable[..., float]) -> float:
         sign = math.copysign(1.0, self.epsilon_rad_v)
-        return choose(
-            1.0 + self.decay_1_v(-rising, rising * sign) / self.decay_1_v(rising, rising * sign)
-            for rising in (1.0, -1.0)
-        )
+        decays = [[self.decay_1_v(way * rising, rising * sign) for way in (-1.0, 1.0)] for rising in (1.0, -1.0)]
+        return choose(1.0 + (k / own if own else math.copysign(math.inf, k) if k else 0.0) for k, own in decays)
 
     @property
     def admissible_rate_v_s(self) -> float:
@@ -320,7 +321,9 @@ class BoucWen(_FromRest):
     def _wrong_way(self, rising: float) -> float:
         """The distance behind a branch that ran in the direction ``rising``; epsilon < 0, so h lies against it."""
         e, d1, h0, n = -self.epsilon_rad_v, self.d1_rad_v, abs(self.settled_branch_rad(rising)), self.exponent
-        size = e / self.alpha_1_v
+        if math.isinf(h0):
+            return math.inf
+        size = e / (self.alpha_1_v or 1.0)  # which cancels at exponent 1
         k, beyond = (self.decay_1_v(-rising, -rising), self.decay_1_v(-rising, rising))
         if e + k * size * (h0 / size) ** n <= d1:
             return 0.0
@@ -406,8 +409,8 @@ class PrandtlIshlinskii(_FromRest):
         slow gain.
 
         Raises:
-            ValueError: For a model without weight at threshold 0: it stands still after a reversal; and with a
-                polynomial.
+            ValueError: For a model without weight at threshold 0: it stands still after a reversal; with a polynomial;
+                and where the sum of the weights up to a threshold is 0 or has another sign than the first one.
         """
         if math.isfinite(self.reach_v):
             raise ValueError(
@@ -416,18 +419,25 @@ class PrandtlIshlinskii(_FromRest):
             )
         r, w = np.array(self.thresholds_v), np.array(self.weights_rad_v)
         slope = np.cumsum(w)
-        if r[0] != 0.0 or np.min(slope) < LEAST:
+        if not r.size or r[0] != 0.0 or abs(slope[0]) < LEAST:
             raise ValueError(
                 "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and "
                 "has no inverse; identify it again with more samples near the reversals"
             )
-        thresholds = [float(np.sum(w[:j] * (r[j] - r[:j]))) for j in range(1, r.size)]
+        if np.min(slope * np.sign(slope[0])) < LEAST:
+            turns = int(np.argmax(slope * np.sign(slope[0]) < LEAST))
+            raise ValueError(
+                f"the slope of the Prandtl-Ishlinskii model turns, or is 0, at its threshold of {r[turns]:g} V, where "
+                f"the weights add up to {slope[turns]:g} rad/V: it has no inverse; give weights whose sums keep the sign "
+                "of the first one"
+            )
+        thresholds = [abs(float(np.sum(w[:j] * (r[j] - r[:j])))) for j in range(1, r.size)]
         slow = slow_gain(self)
         return PrandtlIshlinskii(
             (0.0, *thresholds),
             (float(1.0 / slope[0]), *map(float, np.diff(1.0 / slope))),
             self.weights_rad_v[0] * self.widening_s / slow,
-            self.rate_limit_v_s * slow,
+            self.rate_limit_v_s * abs(slow),
         )
 
     def _run(self, drive_v: Floats, step_s: float) -> tuple[Floats, Floats]:
@@ -463,6 +473,16 @@ class Creep(_Numbers):
     weights_rad_v: tuple[float, ...] = ()
     time_constants_s: tuple[float, ...] = ()
 
+    def check(self) -> None:
+        """Raises ValueError for numbers that are not finite, and for weights that do not fit the time constants."""
+        _Numbers.check(self)  # super() does not find the class that the slots made
+        constants, weights = np.array(self.time_constants_s, dtype=float), np.array(self.weights_rad_v, dtype=float)
+        if constants.shape != weights.shape or not np.all(constants > 0.0):
+            raise ValueError(
+                f"creep of {weights.size} weights and the time constants {self.time_constants_s} s: give as many "
+                "weights, and time constants above 0"
+            )
+
     def response(self, drive_v: ArrayLike, step_s: float) -> Floats:
         """What creep adds to the output (rad), shape (samples,), from rest.
 
@@ -486,11 +506,6 @@ class Creep(_Numbers):
         drive = _from_rest(drive_v, step_s, "drive_v")
         self.check()
         constants, weights = (np.array(each, dtype=float) for each in (self.time_constants_s, self.weights_rad_v))
-        if constants.shape != weights.shape or not np.all(constants > 0.0):
-            raise ValueError(
-                f"creep of {weights.size} weights and the time constants {self.time_constants_s} s: give as many "
-                "weights, and time constants above 0"
-            )
         states = kernels.lag_response(drive, step_s, constants, np.zeros(constants.size))
         return _sound(np.asarray(states[1:] @ weights))
 
@@ -563,10 +578,17 @@ def secant_gain(model: BoucWen | PrandtlIshlinskii, output_rad: float) -> float:
 
     Args:
         model: Hysteresis model.
-        output_rad: Amplitude of the output; infinite gives the slow gain.
+        output_rad: Amplitude of the output; infinite gives the slow gain, and 0 that at rest.
+
+    Raises:
+        ValueError: For an amplitude that is no number or below 0.
     """
-    if isinstance(model, BoucWen) or math.isinf(output_rad):
+    if not output_rad >= 0.0:
+        raise ValueError(f"output_rad is {output_rad} rad: give an amplitude of the output, 0 or above")
+    if isinstance(model, BoucWen) or math.isinf(output_rad) or not model.thresholds_v:
         return slow_gain(model)
+    if output_rad == 0.0:
+        return rest_gain(model)
     knots = [output_amplitude(model, r) for r in model.thresholds_v]
     slopes = np.cumsum(model.weights_rad_v)
     last = max(i for i, y in enumerate(knots) if y <= output_rad)
@@ -582,6 +604,9 @@ def gain_only(model: BoucWen | PrandtlIshlinskii, output_rad: float = math.inf) 
         model: Hysteresis model.
         output_rad: Amplitude of the output at which the secant gain is taken; infinite, as by default, gives the slow
             gain.
+
+    Raises:
+        ValueError: For an amplitude that is no number or below 0.
     """
     return BoucWen(secant_gain(model, output_rad), 0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -134,7 +134,7 @@ class Mirror:
             name: What the mirror is called in messages.
 
         Raises:
-            ValueError: For a linear part that is improper, not stable, or has no gain at rest.
+            ValueError: For a linear part that is not strictly proper, not stable, or has no gain at rest.
         """
         model = hysteresis if isinstance(hysteresis, BoucWen | PrandtlIshlinskii) else BoucWen(hysteresis, *[0.0] * 5)
         for each in (model, creep):
@@ -145,15 +145,16 @@ class Mirror:
         )
         if not all(c.ndim == 1 and c.size and np.isfinite(c).all() for c in (top, bottom)):
             raise ValueError(f"mirror {name!r}: numerator and denominator have to be rows of finite coefficients")
-        if bottom.size == 1:
+        power = np.trim_zeros(top, "f").size
+        if power == bottom.size == 1 and bottom[0]:
             return assemble(name, "static", None, model, creep)
         if np.max(np.abs([*top, *bottom])) > lti.STEEPEST * abs(bottom[0]) > 0.0:
             raise ValueError(f"the denominator of mirror {name!r} begins with {bottom[0]:g}, nothing beside the others")
-        if top.size > bottom.size or bottom[0] == 0.0 or np.max(np.roots(bottom).real) >= 0.0 or top[-1] == 0.0:
+        if power >= bottom.size or bottom[0] == 0.0 or top[-1] == 0.0 or np.max(np.roots(bottom).real) >= 0.0:
             raise ValueError(
                 f"the linear part of mirror {name!r} has a numerator of {top.size} and a denominator of {bottom.size} "
-                "coefficients: give one that is proper and stable (every root of the denominator left of the imaginary "
-                "axis) and that passes a constant"
+                "coefficients: give one that is strictly proper and stable (every root of the denominator left of the "
+                "imaginary axis) and that passes a constant"
             )
         system = lti.modal_from_polynomials(top.tolist(), bottom.tolist())
         gain = float(lti.frequency_response(system, np.array([0.0]))[0, 0, 0].real)

@@ -152,7 +152,7 @@ def inverse(m: Mirror) -> Inverse:
     """Inverse of the mirror's hysteresis and creep: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
 
     Raises:
-        ValueError: For a Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
+        ValueError: For a Prandtl-Ishlinskii model without an inverse, see `PrandtlIshlinskii.inverted`.
     """
     direct = [0.0] * m.actuators
     bouc_wen, plays = [], []

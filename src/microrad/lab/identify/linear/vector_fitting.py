@@ -226,7 +226,7 @@ def _moved_by(before: Complexes, after: Complexes) -> float:
     """Largest way of a pole over its decay; infinite where a pair has become two real poles or the other way round."""
     if np.count_nonzero(before.imag) != np.count_nonzero(after.imag):
         return np.inf
-    a, b = (poles[np.argsort(np.abs(poles) + (poles.imag != 0) * 1e300)] for poles in (before, after))
+    a, b = (poles[np.lexsort((np.abs(poles), poles.imag != 0))] for poles in (before, after))
     return float(np.max(np.abs(np.abs(a) - np.abs(b)) / np.abs(b.real) + np.abs(a.real / b.real - 1.0)))
 
 
