@@ -693,9 +693,8 @@ def test_the_frequency_or_period_that_would_fit_is_taken(design, limits, value):
     [
         (
             lambda: chirp(ODD, stop_hz=138.25, amplitude_v=0.1),
-            "stop reaches 138.25 Hz, 4.4997 samples a period at 622.08 Hz "
-            "where limits.samples_per_period asks for 4.5; "
-            "would fit: at most 138.2 Hz, or a rate of at least 622.2 Hz",
+            "stop reaches 138.25 Hz, 4.4997 samples a period at 622.08 Hz where limits.samples_per_period asks for "
+            "4.5; would fit: at most 138.2 Hz, or a rate of at least 622.2 Hz",
         ),
         (lambda: chirp(amplitude_v=6.00001), "takes the drive to 12.00001 V, limits.drive_max is 12 V"),
         (lambda: chirp(offset_v=12.00001), "offset has 12.00001 V, outside"),

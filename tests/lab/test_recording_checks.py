@@ -1723,6 +1723,7 @@ def test_an_output_of_fewer_than_fifty_steps_is_refused_and_from_five_hundred_on
         (50.0, 150, "0.04 s since the sample before, where 0.02 s is usual; 1 gap, about 1 sample lost"),
         (102.4, None, ""),
         (97.0, None, ""),
+        (99.2, None, ""),
     ],
 )
 def test_a_lost_sample_shows_where_the_time_has_just_the_digits_of_its_step(rate_hz, lost, told):

@@ -2208,3 +2208,9 @@ def test_an_index_picks_a_channel_out_of_an_array_where_each_part_is_within_its_
 )
 def test_a_shape_may_leave_out_axes_of_length_one_where_all_of_them_are(shape, axes, found):
     assert _with_axes(shape, axes) == found
+
+
+@pytest.mark.parametrize("blank", ["", " ", "  "])
+def test_a_quoted_name_behind_a_blank_is_one_cell(blank):
+    line = f'time,{blank}"u, x",{blank}y'
+    assert text_format.split(line, ",") == ["time", "u, x", "y"]

@@ -428,8 +428,8 @@ class PrandtlIshlinskii(_FromRest):
             turns = int(np.argmax(slope * np.sign(slope[0]) < LEAST))
             raise ValueError(
                 f"the slope of the Prandtl-Ishlinskii model turns, or is 0, at its threshold of {r[turns]:g} V, where "
-                f"the weights add up to {slope[turns]:g} rad/V: it has no inverse; give weights whose sums keep the sign "
-                "of the first one"
+                f"the weights add up to {slope[turns]:g} rad/V: it has no inverse; give weights whose sums keep the "
+                "sign of the first one"
             )
         thresholds = [abs(float(np.sum(w[:j] * (r[j] - r[:j])))) for j in range(1, r.size)]
         slow = slow_gain(self)

@@ -14,7 +14,8 @@ from microrad.lab.recording.records import Finding, RecordingError
 _SAME_RATE = 1e-3
 # A step that is half as long again as the usual one has lost time that no clock wanders by.
 _GAP = 1.5
-# A constant step that is no multiple of the last digit is rounded to two steps: a rarer other one is no rounding.
+# A constant step that is no multiple of the last digit is rounded to two steps, the rarer one at even distances: one
+# that is rarer than this, and not so, is no rounding.
 _RARE = 0.01
 # The output changes by 2π f δt for a jitter δt at the frequency f: with ten samples per period 1 % of a step is 0.6 %
 # of the amplitude, about what a good sensor's noise is; 10 % is 6 %, as large as a hysteresis loop.
@@ -125,14 +126,17 @@ def _resolution(time_s: Floats) -> float:
 def _slack(steps: Floats, step_s: float, resolution_s: float) -> float:
     """How far rounding of the digits alone can move a step: nothing where the step is a multiple of the last digit.
 
-    Where nearly all steps are the usual one, that is the step: the mean of all has lost samples in it.
+    Where nearly all steps are the usual one and the others do not come at even distances, as those of a clock that is a
+    little slow do, that is the step: the mean of all has lost samples in it.
 
     A grid with a constant step strays from its own straight line by one unit of the last digit at most; what strays
     farther is no rounding.
     """
     usual = float(np.median(steps))
-    rare = np.mean(np.abs(steps - usual) > 0.5 * resolution_s) < _RARE
-    parts = (usual if rare else step_s) / resolution_s if resolution_s else math.inf
+    others = np.flatnonzero(np.abs(steps - usual) > 0.5 * resolution_s)
+    even = others.size > 2 and np.ptp(np.diff(others)) <= 2
+    step = usual if others.size < _RARE * steps.size and not even else step_s
+    parts = step / resolution_s if resolution_s else math.inf
     if parts > 100 or (parts > 0.5 and abs(parts - round(parts)) < 1e-6):
         return 0.0
     astray = np.cumsum(steps - step_s)
@@ -152,8 +156,8 @@ def _steps(
         lost = int(np.sum(np.round(steps[gaps] / usual) - 1))
         raise RecordingError(
             f"{where}: {place(row + 1)}, {label}: {steps[row]:.6g} s since the sample before, where {usual:.6g} s is "
-            f"usual; {gaps.size} gap{'s' * (gaps.size > 1)}, about {lost} sample{'s' * (lost > 1)} lost. Cut the "
-            "recording there, because hysteresis remembers what happened in the gap."
+            f"usual; {gaps.size} gap{'s' if gaps.size > 1 else ''}, about {lost} sample{'s' * (lost != 1)} lost. Cut "
+            "the recording there, because hysteresis remembers what happened in the gap."
         )
     if stops.size:
         row = int(stops[0])
