@@ -803,3 +803,28 @@ def test_columns_behind_a_linear_part_are_late_by_both_delays(hold, delay_s, lat
     shift = round((delay_s + late_s) / 1e-3)
     assert_allclose(found[40:], expected[40 - shift : 200 - shift], rtol=1e-6)
     assert joint.behind_linear_part(columns, None, run) is columns
+
+
+def test_the_lags_of_creep_are_those_that_the_thinned_records_show(monkeypatch):
+    given = []
+
+    def seen(records):
+        given.extend(records)
+        raise RuntimeError("seen")
+
+    monkeypatch.setattr(joint, "time_constants", seen)
+    monkeypatch.setattr(joint, "_MOST_SAMPLES", 500)
+    drive = np.sin(np.linspace(0.0, 9.0, 2000))
+    with pytest.raises(RuntimeError, match="seen"):
+        fit_joint([recorded(drive, 5e-5 * drive, 1e3)], "prandtl_ishlinskii_creep", UNITS)
+    assert [(record.drive_v.size, record.step_s) for record in given] == [(500, 4e-3)]
+
+
+@pytest.mark.parametrize(
+    ("damping", "expected"),
+    [(0.6, [-6 + 8j, -6 - 8j]), (-0.6, [6 + 8j, 6 - 8j]), (1.0, [-10]), (-1.0, [10])],
+)
+def test_roots_keep_their_half_plane(damping, expected):
+    roots = Roots((10.0 / (2.0 * math.pi),), (damping,))
+    assert_allclose(np.sort_complex(roots.values), np.sort_complex(np.array(expected, dtype=complex)), rtol=1e-12)
+    assert Roots.of(roots.values).dampings == pytest.approx(roots.dampings)

@@ -790,3 +790,16 @@ def test_a_number_just_beyond_its_limit_is_not_told_as_the_limit(found, expected
     with pytest.raises(ValueError) as refused:
         found()
     assert str(refused.value) == expected
+
+
+def test_each_time_of_an_acquisition_has_its_own_place_in_the_sequence():
+    times = {"settle_s": 2.5, "detection_s": 0.01, "detection_frames": 7, "response_s": 0.2, "measurement_s": 0.03,
+             "steering_s": 0.04, "lock_s": 0.5}  # fmt: skip
+    two = SimpleNamespace(called={"leo": "A", "geo": "B"}.get)
+    timing = partner_search._timing(two, SimpleNamespace(**times), 4e7)
+    assert timing == Timing(
+        range_m=4e7, body_settling_s=2.5, frame_time_s=0.01, frames=7, geo_response_s=0.2, leo_detection_s=0.03,
+        mirror_settling_s=0.04, lock_time_s=0.5, own_name="A", partner_name="B",
+    )  # fmt: skip
+    alike = partner_search._timing(SimpleNamespace(called=lambda role: "A"), SimpleNamespace(**times), 4e7)
+    assert (alike.own_name, alike.partner_name) == ("A (own)", "A (partner)")

@@ -526,3 +526,4 @@ def test_a_loop_of_the_kernel_has_the_amplifier_of_each_actuator_and_starts_at_r
               "counts": (2, 2), "inverse_clamped": (2,), "position": (1,)}  # fmt: skip
     assert {name: getattr(state, name).shape for name in shapes} == shapes
     assert not any(np.any(each) for each in state if isinstance(each, np.ndarray))
+    assert np.iinfo(state.counts.dtype).max > 1e15  # of plant steps

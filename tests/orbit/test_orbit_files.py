@@ -1899,3 +1899,10 @@ def test_the_objects_of_an_ephemeris_are_listed_by_name_and_identifier(tmp_path,
 def test_a_satellite_of_several_element_sets_is_offered_once(tmp_path):
     with pytest.raises(OrbitError, match="none of its 3 element sets is of 'EXAMPEL'; nearest are EXAMPLE 1: name"):
         elements(tmp_path, NAMED * 3, "EXAMPEL")
+
+
+def test_velocities_beside_a_hole_that_is_not_used_are_not_held_against_it(tmp_path):
+    usable = {"USEABLE_START_TIME": stamp(3600), "USEABLE_STOP_TIME": stamp(5400)}
+    times = np.r_[0.0, GRID[GRID >= 3540.0]]
+    assert ephemeris(tmp_path, HEAD + segment(times, **usable)).states(4000.0).position_m.shape == (3,)
+    no_ephemeris(tmp_path, HEAD + segment(times), "no state vector between")

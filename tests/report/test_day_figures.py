@@ -1057,3 +1057,13 @@ def test_hours_of_a_span_are_a_round_step_apart_from_a_begin_that_is_none(end_s,
     found = figures._hours(180.0, 180.0 + end_s)
     assert np.diff(found) == pytest.approx(hours)
     assert 0.05 <= found[0] <= 0.05 + hours and found[-1] > 0.05 + end_s / 3600.0 - hours
+
+
+@pytest.mark.parametrize(
+    ("point", "inside"),
+    [((2, 1), True), ((0.5, 1), False), ((1.5, 2), True), ((3.6, 1), False), ((2.6, 1), True), ((2.1, 2.9), False)],
+)
+def test_a_point_beside_slanted_edges_is_inside_of_them_or_not(point, inside):
+    """At a height y the triangle reaches from 2 y / 3 to 4 - 2 y / 3."""
+    ring = np.array([(0.0, 0.0), (4.0, 0.0), (2.0, 3.0), (0.0, 0.0)])
+    assert odd([ring], point) is odd([ring[::-1]], point) is inside

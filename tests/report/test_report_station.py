@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -70,3 +71,16 @@ def test_nothing_is_said_of_it_in_still_air(call, folder):
     assert "rrival" not in found.out
     assert "angle_of_arrival" not in json.loads(call("pointing", "m.toml", "--json").out)
     assert TURBULENCE in station_text()
+
+
+def test_a_mirror_of_unknown_dynamics_is_not_marked_as_met(fine):
+    class Unknown:
+        """The scene of a mirror whose dynamics are not known."""
+
+        unknown_dynamics = "its dynamics are not known"
+
+        def __getattr__(self, name):
+            return getattr(fine.scene, name)
+
+    for of, met in ((fine, True), (replace(fine, scene=Unknown()), False)):
+        assert fine_pointing_view(of, 1.0, ()).blocks[0].good is met

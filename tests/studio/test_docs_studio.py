@@ -6,9 +6,11 @@ import re
 import secrets
 import signal
 import sys
+import webbrowser
 from email.message import Message
 from http.cookiejar import CookieJar
 from pathlib import Path
+from queue import SimpleQueue
 from types import SimpleNamespace
 from urllib.request import Request
 
@@ -269,3 +271,12 @@ def test_a_kill_while_the_key_has_two_names_leaves_the_second_one_once(tmp_path,
     assert len(names) == 2 and "studio-key" in names
     assert signing.is_ours(b"job", signing.code(b"job"))
     assert sorted(path.name for path in (tmp_path / "microrad").iterdir()) == names
+
+
+def test_the_browser_is_opened_where_the_studio_is_open_to_the_network_too(monkeypatch, capsys):
+    opened = SimpleQueue()
+    monkeypatch.setattr(server, "way_in", lambda of, url: f"page of {of} at {url}")
+    monkeypatch.setattr(webbrowser, "open", opened.put)
+    command._ready(SimpleNamespace(studio="it"), server.Entrance(None, ("192.168.1.7:81",), "s"), "192.168.1.7", True)
+    assert opened.get(timeout=60.0) == "page of it at http://192.168.1.7:81/?token=s"
+    assert "open to the network on 192.168.1.7" in capsys.readouterr().err

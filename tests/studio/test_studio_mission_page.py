@@ -1339,3 +1339,20 @@ def test_a_key_is_looked_for_as_it_is_typed_in_the_field_above_the_tables(sessio
     )
     page.search.value = None
     assert (page.form.sought, page.form.table) == ("", "terminals")
+
+
+def test_a_dialog_closes_when_its_work_is_done_and_says_why_it_could_not_be(tab):
+    faults = [ValueError("no such table"), None]
+
+    def work():
+        if fault := faults.pop(0):
+            raise fault
+
+    with ui.row() as place, mission._dialog("Add a table", "Add", work):
+        ui.label("within")
+    (shown,) = (each for each in place.client.elements.values() if isinstance(each, ui.dialog) and each.value)
+    add = buttons(shown)["Add"]
+    press(add)
+    assert (shown.value, "no such table" in texts(shown)) == (True, True)
+    press(add)
+    assert (shown.value, "no such table" in texts(shown)) == (False, False)
