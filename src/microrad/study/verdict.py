@@ -283,7 +283,7 @@ def _travel_claim(e: Evidence) -> Claim:
     reach = 2.0 * hysteresis.output_amplitude(e.summary.model, span / 2.0)
     why = f"what the hysteresis model gives over a drive range of {span:.4g} V; the rest is drive or gain not printed"
     agrees = "yes" if reach >= CLAIMED_TRAVEL_RAD else "no"
-    ours = f"{format_beyond(reach, CLAIMED_TRAVEL_RAD, 'rad', 3)} within the amplifier's range"
+    ours = f"{format_beyond(1e3 * reach, 1e3 * CLAIMED_TRAVEL_RAD, '', 3)} mrad within the amplifier's range"
     return Claim("section 3.2", "travel of 2.5 mrad", ours, agrees, why)
 
 
