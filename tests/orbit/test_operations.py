@@ -26,6 +26,7 @@ from microrad.orbit.operations import (
     deliver,
     pool,
     service,
+    spreadsheet_text,
     store,
 )
 
@@ -820,3 +821,198 @@ def test_a_refusal_of_a_plan_says_its_numbers(call, error, words):
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+EARLY = Service(np.array([2.0, 5.0, 11.0, 12.5]), np.array([3.0, 0.5, 7.0]), 0.75)
+LATE = Service(np.array([20.0, 23.0]), np.array([4.0]), 0.5)
+SLABS = Latency(np.array([4.0, 9.0]), np.array([2.0, 9.0]), np.array([6.0, 1.5]), 2.5)
+
+
+def rows(found):
+    """Times, then what was made, lost, delivered and is stored, then all of the latency."""
+    late = found.latency
+    store = [found.time_s, found.generated_bit, found.lost_bit, found.delivered_bit, found.stored_bit]
+    return [*store, late.first_s, late.last_s, late.volume_bit, late.missing_bit]
+
+
+def two(names):
+    return contact_plan([PlannedSession(*each, 3.0, 4.0, 9.0, 80.0, 1.0, 1.0, 2.0) for each in names], utc, "BA", "zy")
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (lambda: [(s := EARLY.within(3.0, 99.0)).edges_s, s.rate_bit_s, s.availability], "3 5 11 12.5 3 0.5 7 0.75"),
+        (lambda: [(s := EARLY.within(-1.0, 11.0)).edges_s, s.rate_bit_s, s.capacity_bit], "2 5 11 3 0.5 9"),
+        (lambda: [(s := EARLY.within(5.0, 6.0)).edges_s, s.rate_bit_s, s.capacity_bit], "5 6 0.5 0.375"),
+        (lambda: [(s := EARLY.within(11.5, 12.0)).edges_s, s.rate_bit_s, s.start_s, s.end_s], "11.5 12 7 11.5 12"),
+        (
+            lambda: [
+                EARLY.within(2.0, 12.5) is EARLY,
+                EARLY.within(2.0, 12.4) is EARLY,
+                EARLY.within(2.1, 12.5) is EARLY,
+            ],
+            "1 0 0",
+        ),
+        (lambda: [(s := EARLY.locked_at(5.0)).edges_s, s.rate_bit_s, s.capacity_bit], "2 5 11 12.5 0 0.5 7 10.125"),
+        (
+            lambda: [(s := EARLY.locked_at(11.75)).edges_s, s.rate_bit_s, s.capacity_bit, s.mean_rate_bit_s],
+            "2 11.75 12.5 0 7 3.9375 0 5.25",
+        ),
+        (lambda: [(s := EARLY.locked_at(12.5)).edges_s, s.rate_bit_s, s.availability], "2 12.5 0 0.75"),
+        (lambda: [(s := EARLY.locked_at(math.inf)).edges_s, s.rate_bit_s, s.capacity_bit], "2 12.5 0 0"),
+        (
+            lambda: [
+                EARLY.locked_at(2.0) is EARLY,
+                EARLY.locked_at(-math.inf) is EARLY,
+                EARLY.locked_at(2.001) is EARLY,
+            ],
+            "1 1 0",
+        ),
+        (
+            lambda: rows(deliver(1.5, (0.0, 30.0), INF, [EARLY, LATE], (0.0, 30.0), 0.25)),
+            (
+                "0 2 5 11 12.5 20 23 30 0 3 7.5 16.5 18.75 30 34.5 45 0 0 0 0 0 0 0 0 0 0 6.75 9 16.875 "
+                "16.875 22.875 22.875 0 3 0.75 7.5 1.875 13.125 11.625 22.125 2.25 1.5833333 0.75 2.25 5.25"
+                " 1.6785714 9 8.6875 1.5833333 0.75 2.25 5.25 1.6785714 1.5 8.6875 8 3 3.75 0.75 1.5 7.5 "
+                "0.375 1.875 4.125 22.125"
+            ),
+        ),
+        (
+            lambda: rows(deliver(1.5, (4.0, 21.0), 6.0, [LATE], (-2.0, 30.0), 3.0)),
+            (
+                "-2 4 8 20 21 23 30 0 0 6 24 25.5 25.5 25.5 0 0 0 18 18 18 18 0 0 0 0 2 6 6 0 0 6 6 5.5 1.5"
+                " 1.5 19 18.666667 18.666667 18 2 4 1.5"
+            ),
+        ),
+        (
+            lambda: rows(deliver(0.0, (0.0, 30.0), 6.0, [EARLY], (0.0, 30.0), 3.0)),
+            "0 2 5 11 12.5 30 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0",
+        ),
+        (
+            lambda: rows(deliver(2.0, (0.0, 5.0), 4.0, [], (0.0, 8.0), 1.0)),
+            "0 2 5 8 0 4 10 10 0 0 6 6 0 0 0 0 0 4 4 4 4",
+        ),
+        (
+            lambda: rows(deliver(2.0, (3.0, 3.5), 4.0, [LATE], (0.0, 23.0), 1.0)),
+            "0 3 3.5 20 20.5 23 0 0 1 1 1 1 0 0 0 0 0 0 0 0 0 0 1 1 0 0 1 1 0 0 18 18 1 0",
+        ),
+        (
+            lambda: rows(deliver(2.0, (0.0, 23.0), 1.0, [LATE], (0.0, 23.0), 0.0)),
+            "0 0.5 20 23 0 1 40 46 0 0 39 39 0 0 0 6 0 1 1 1 20 0.5 20 0.5 1 5 1",
+        ),
+        (lambda: [deliver(1.5, (0.0, 30.0), INF, [EARLY, LATE], (0.0, 30.0), 0.0).largest_stored_bit], "22.125"),
+        (lambda: SLABS.cdf([[0.0, 2.0, 2.5], [4.0, 8.999, 9.0]]), "0 0 0.15 0.6 0.6 0.75"),
+        (lambda: [SLABS.cdf(3.0), SLABS.delivered_bit, SLABS.delivered_share], "0.3 7.5 0.75"),
+        (lambda: [SLABS.quantile(share) for share in (0.0, 0.3, 0.6, 0.601, 0.75, 0.7501, 1.0)], "2 3 4 9 9 inf inf"),
+        (lambda: pool([SLABS]).cdf([3.5, 99.0]), "0.45 0.75"),
+        (
+            lambda: [
+                (none := Latency(np.empty(0), np.empty(0), np.empty(0), 0.0)).delivered_share,
+                none.quantile(0.5),
+                *none.cdf([1.0]),
+            ],
+            "nan nan nan",
+        ),
+        (
+            lambda: [TABLE.rate_bit_s(38e6), TABLE.rate_bit_s(0.0), TABLE.rate_bit_s(42e6 * (1.0 + 1e-12))],
+            "2e+09 2e+09 0",
+        ),
+        (lambda: RateTable((Step(5.0, 0.0), Step(2.0, INF))).rate_bit_s([[0.0, 1.0], [1e12, INF]]), "5 2 2 2"),
+        (
+            lambda: [
+                (s := service(RateTable((Step(5.0, 0.0), Step(2.0, INF))), (3.0, 7.5), lambda t: 1e6 + t, 0.5)).edges_s,
+                s.rate_bit_s,
+            ],
+            "3 7.5 2",
+        ),
+        (
+            lambda: [(s := service(TABLE, (10.0, 10.0 + 5e-7), lambda t: 4e7 + t, 0.5)).edges_s - 10.0, s.rate_bit_s],
+            "0 5e-07 1e+09",
+        ),
+        (
+            lambda: [
+                (s := service(TABLE, (0.0, 900.0), lambda t: 43e6 - 1e4 * t, 1.0)).edges_s,
+                s.rate_bit_s,
+                s.capacity_bit,
+            ],
+            "0 100 500 900 0 1e+09 2e+09 1.2e+12",
+        ),
+    ],
+)
+def test_parts_of_a_contact_stores_at_their_limits_and_slabs_of_latency_have_each_number(found, expected):
+    told = np.hstack([np.ravel(np.asarray(each, dtype=np.float64)) for each in found()])
+    assert told == pytest.approx([*map(float, expected.split())], rel=1e-6, abs=1e-9, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        (
+            lambda: contact_plan([], utc, ("A",), ()),
+            (
+                "# Contact plan: seconds after the reference time, rates in byte/s, one-way light times in "
+                's.\n# node 1 is "A"\n@ 2026/03/20-12:00:00'
+            ),
+        ),
+        (
+            lambda: csv_text([], utc).replace("\n", "|"),
+            (
+                "satellite,relay,start (UTC),lock (UTC),end (UTC),start (s),lock (s),end (s),smallest range"
+                " (m),largest range (m),rate (bit/s),volume (bit)"
+            ),
+        ),
+        (
+            lambda: "|".join(two([("A", "z"), ("B", "y"), ("A", "y"), ("B", "z")]).split("\n")[6::2]),
+            "a contact +4 +9 1 3 10|a contact +4 +9 1 4 10|a contact +4 +9 2 3 10|a contact +4 +9 2 4 10",
+        ),
+        (
+            lambda: "|".join(
+                contact_plan([PlannedSession("A", "z", 1.0, 2.0, 3.0, 8.0, 1.0, 1.0, 0.0)], utc, "A", "z").split("\n")[
+                    4:
+                ]
+            ),
+            "a contact +2 +3 1 2 1|a range +2 +3 1 2 0",
+        ),
+        (
+            lambda: "|".join(
+                contact_plan([PlannedSession("A", "z", 1.0, 2.0, 3.0, 7.999, 1.0, 1.0, 9.0)], utc, "A", "z").split(
+                    "\n"
+                )[4:]
+            ),
+            "# left out, no whole byte a second: 1 2 from 2.000 s to 3.000 s",
+        ),
+        (
+            lambda: "|".join(
+                contact_plan([PlannedSession("A", "z", 1.0, 2.001, 3.999, 8.0, 1.0, 1.0, 9.0)], utc, "A", "z").split(
+                    "\n"
+                )[4:]
+            ),
+            "# left out, no whole second with data: 1 2 from 2.001 s to 3.999 s",
+        ),
+        (lambda: contact_plan([], utc, ("é\n" * 60,), ()).split("\n")[1][-12:], "n\\u00e9\\n\\u0"),
+        (
+            lambda: (
+                csv_text([PlannedSession("a,b", 'say "x"', 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)], utc)
+                .split("\n")[1]
+                .partition(",2026")[0]
+            ),
+            '"a,b","say ""x"""',
+        ),
+        (lambda: spreadsheet_text("=1+1"), "'=1+1"),
+        (lambda: spreadsheet_text("+1"), "'+1"),
+        (lambda: spreadsheet_text("-1"), "'-1"),
+        (lambda: spreadsheet_text("@a"), "'@a"),
+        (lambda: spreadsheet_text("'a"), "''a"),
+        (lambda: spreadsheet_text("a=b"), "a=b"),
+        (lambda: spreadsheet_text(""), ""),
+        (lambda: spreadsheet_text("\ta"), "'\ta"),
+        (lambda: spreadsheet_text("\ra"), "'\ra"),
+        (lambda: spreadsheet_text("\na"), "'\na"),
+        (lambda: spreadsheet_text("\x1b[31m"), "\\u001b[31m"),
+        (lambda: spreadsheet_text(" =1"), " =1"),
+        (lambda: spreadsheet_text("a\x07"), "a\\u0007"),
+    ],
+)
+def test_plans_of_nothing_of_equal_starts_and_of_names_that_steer_are_written_whole(found, expected):
+    assert found() == expected
