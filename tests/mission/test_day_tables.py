@@ -383,7 +383,7 @@ def test_a_decayed_orbit_is_refused_with_its_perigee(tmp_path, changes):
 
 
 def test_no_orbit_so_high_is_sun_synchronous(tmp_path):
-    has(refused_orbit(tmp_path, {"orbit.leo.altitude": "6000 km"}), "orbit.leo: ", "6000 km", "below 5974 km")
+    has(refused_orbit(tmp_path, {"orbit.leo.altitude": "6000 km"}), "orbit.leo: ", "6000 km", "at most 5974 km")
 
 
 BY_ELEMENTS = {"orbit.leo": {"kind": "elements", "file": "a.tle"}, **ALONE}
@@ -675,7 +675,7 @@ ALL_OF_A_DAY = {
         ).problems(),
         """
         planes is missing, and pattern = "delta" needs it: expected planes = 1 would do; phasing is missing, and
-        pattern = "delta" needs it: expected phasing = 1 would do; session is below shortest: expected at least 90
+        pattern = "delta" needs it: expected phasing = 0 would do; session is below shortest: expected at least 90
         s; stations.east is the name of a relay, too: expected a name of its own
         """,
     ),

@@ -2337,3 +2337,24 @@ def test_a_parameter_is_found_at_its_table_its_field_and_its_item():
         ("creep", "weights_rad_v", 0),
         ("linear", "pole_dampings", 2),
     ]
+
+
+@pytest.mark.parametrize(
+    ("of", "value", "words"),
+    [
+        (
+            Quantity("rad", most=math.pi / 2, typical="deg"),
+            math.radians(90.001),
+            "x is 90.001 deg: it must be finite, at most 90 deg",
+        ),
+        (Quantity("m", most=50e3), 50000.01, "x is 50.00001 km: it must be finite, at most 50 km"),
+        (Quantity("", most=1.0), 1.0000001, "x is 1.0000001: it must be finite, at most 1"),
+        (Quantity("m", above=0.0), 0.0, "x is 0 m: it must be finite, above 0 m"),
+        (Quantity("m", least=2.0, most=3.0), 1.99996, "x is 1.99996 m: it must be finite, at least 2 m, at most 3 m"),
+        (Whole("", least=1, most=9), 9.00001, "x is 9.00001: it must be whole, at least 1, at most 9"),
+    ],
+)
+def test_a_value_that_is_refused_has_the_digits_that_tell_it_from_its_bounds(of, value, words):
+    with pytest.raises(ValueError) as refused:
+        of.check("x", value)
+    assert str(refused.value) == words

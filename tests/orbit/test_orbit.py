@@ -648,9 +648,17 @@ def test_a_sun_synchronous_node_goes_round_once_in_a_tropical_year(altitude_m, e
 
 def test_an_altitude_or_eccentricity_without_a_sun_synchronous_orbit_is_refused():
     analytic.sun_synchronous_inclination_rad(5974e3)
-    for altitude in (5975e3, -7e6, -RE, math.nan):
-        with pytest.raises(OrbitError, match="can be sun-synchronous"):
+    for altitude, words in (
+        (5975e3, "can be sun-synchronous"),
+        (-7e6, "centre"),
+        (-RE, "centre"),
+        (math.nan, "centre"),
+    ):
+        with pytest.raises(OrbitError, match=words):
             analytic.sun_synchronous_inclination_rad(altitude)
+    with pytest.raises(OrbitError, match="take an altitude of at most 6658 km"):
+        analytic.sun_synchronous_inclination_rad(7000e3, 0.3)
+    analytic.sun_synchronous_inclination_rad(6658e3, 0.3)
     for eccentricity in (1.0, 1.5, -1e-9, math.nan):
         with pytest.raises(OrbitError, match=f"eccentricity {eccentricity:.6g} is not from 0"):
             analytic.sun_synchronous_inclination_rad(500e3, eccentricity)
@@ -1057,7 +1065,7 @@ PLACES = np.array([[RE + 3e5, RE + 2.5e5, RE + 7e4], [0.0, 0.0, 0.0], [0.0, 0.0,
             OrbitError,
             (
                 "no orbit 6123.46 km over the equator can be sun-synchronous: the flattening turns its "
-                "node too slowly; take an altitude below 5974 km"
+                "node too slowly; take an altitude of at most 5974 km"
             ),
         ),
         (

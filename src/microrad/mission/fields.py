@@ -115,7 +115,7 @@ class Quantity:
         """
         if not math.isfinite(value) or self.out_of_bounds(value):
             limits, reason = ", ".join(filter(None, ("finite", self.limits))), f"; {why}" if why else ""
-            raise ValueError(f"{name} is {self._show(value).strip()}: it must be {limits}{reason}")
+            raise ValueError(f"{name} is {self._beyond(value)}: it must be {limits}{reason}")
 
     def out_of_bounds(self, number: float) -> str:
         """Why a number is not allowed, or nothing."""
@@ -127,10 +127,19 @@ class Quantity:
             return f"is above {self._show(self.most)}"
         return ""
 
-    def _show(self, number: float) -> str:
+    def _beyond(self, value: float) -> str:
+        """A value that is refused, in as many digits as tell it from the bounds."""
+        bounds = [each for each in (self.above, self.least, self.most) if each is not None]
+        for digits in range(4, 13):
+            shown = self._show(value, digits)
+            if shown not in [self._show(each, digits) for each in bounds]:
+                return shown.strip()
+        return self._show(value).strip()
+
+    def _show(self, number: float, digits: int = 4) -> str:
         if self.typical.startswith("deg"):  # whoever writes degrees does not read radians
-            return f"{number / parse_quantity(f'1 {self.typical}', self.unit):.4g} {self.typical}"
-        return format_quantity(number, self.unit) if self.unit else f"{number:g}"
+            return f"{number / parse_quantity(f'1 {self.typical}', self.unit):.{digits}g} {self.typical}"
+        return format_quantity(number, self.unit, digits) if self.unit else f"{number:.{max(digits, 6)}g}"
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Read the text in place of pydantic's own number."""
@@ -177,8 +186,8 @@ class Whole(Quantity):
         """What the key expects, in words."""
         return f"a whole number without quotes, from {self._show(self.least or 0)} to {self._show(self.most or 0)}"
 
-    def _show(self, number: float) -> str:
-        return Quantity._show(self, number) if number % 1 else str(int(number))
+    def _show(self, number: float, digits: int = 4) -> str:
+        return Quantity._show(self, number, digits) if number % 1 else str(int(number))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """A whole number with its bounds."""

@@ -4,7 +4,7 @@ import math
 import re
 
 from microrad.core import units
-from microrad.core.units import format_quantity
+from microrad.core.units import format_beyond, format_quantity
 from microrad.link.radial_error import SMALLEST_PROBABILITY
 
 MINUS = "\u2212"
@@ -122,16 +122,16 @@ def given_angle(value_rad: float) -> str:
 
 # ----------------------------------------------------------------------------------------------------- shares and time
 def percent(share: float, digits: int = 2) -> str:
-    """A share in per cent: "2.3 %".
+    """A share in per cent: "2.3 %"; one that is not all is not told as all.
 
     Args:
         share: 1 for all of it.
-        digits: significant ones.
+        digits: significant ones, more where they would make it 100 %.
     """
     value = 100.0 * share
     if 0.0 < abs(value) < 1e-3:
         return f"{_LESS[int(value < 0.0)]} %"
-    return f"{plain(value, digits)} %"
+    return f"{format_beyond(value, 100.0, '', digits)} %"
 
 
 def share_of_time(quantile: float) -> str:

@@ -190,12 +190,13 @@ class Constellation(Table):
     def problems(self) -> Iterator[Problem]:
         """The keys of the pattern, and no others; planes that divide the satellites."""
         from_file = self.pattern == "file"
-        needed = {"file": '"satellites.tle"'} if from_file else {"satellites": "1", "planes": "1", "phasing": "1"}
+        needed = {"file": '"satellites.tle"'} if from_file else {"satellites": "1", "planes": "1", "phasing": "0"}
         yield from self.choice_problems(f'pattern = "{self.pattern}"', needed, ("stations",))
         if self.satellites and self.planes and self.satellites % self.planes:
             yield Problem("planes", f"does not divide satellites = {self.satellites}", "a divisor of it")
         if self.planes and self.phasing is not None and self.phasing >= self.planes:
-            yield Problem("phasing", f"is not below planes = {self.planes}", f"0 to {self.planes - 1}")
+            expected = f"0 to {self.planes - 1}" if self.planes > 1 else "0"
+            yield Problem("phasing", f"is not below planes = {self.planes}", expected)
         if self.shortest_s <= self.overhead_s:
             reason = "is not above overhead: such a session would carry no data"
             yield Problem("shortest", reason, f"more than {format_input(self.overhead_s, 's')}")

@@ -104,7 +104,7 @@ def _check_size(path: Path, size: int) -> None:
         raise OrbitError(f"{path}: the file is empty; download or export it again")
     if size > MOST_BYTES:
         raise OrbitError(
-            f"{path}: {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read; keep only "
+            f"{path}: {math.ceil(size / 1e6)} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read; keep only "
             "the satellites and the days that the mission needs"
         )
 

@@ -128,8 +128,8 @@ def _commands(one: PlannedSession, nodes: dict[str, int], shift: float) -> list[
     rate = math.floor(one.rate_bit_s / 8.0)
     if rate > _LARGEST_RATE_BYTE_S:
         raise OperationsError(
-            f"the session of {one.satellite!r} with {one.relay!r} has {one.rate_bit_s:g} bit/s; ION takes at most "
-            f"{8 * _LARGEST_RATE_BYTE_S:g} bit/s"
+            f"the session of {one.satellite!r} with {one.relay!r} has {one.rate_bit_s:.0f} bit/s; ION takes at "
+            f"most {8 * _LARGEST_RATE_BYTE_S} bit/s"
         )
     if end <= start or rate == 0:
         why = "no whole byte a second" if rate == 0 else "no whole second with data"

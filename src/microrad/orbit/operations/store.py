@@ -52,9 +52,9 @@ class Latency:
         if math.isnan(self.delivered_share):
             return math.nan
         wanted = share * (1.0 - _ROUNDING)
-        if self.delivered_share < wanted:
-            return math.inf
         knots = np.unique(np.concatenate((self.first_s, self.last_s)))
+        if self.delivered_share < wanted or not knots.size:
+            return math.inf
         low, high = -1, knots.size - 1  # at `high` the share is reached, at `low` it is not
         while high - low > 1:
             middle = (low + high) // 2

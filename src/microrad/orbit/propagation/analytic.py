@@ -8,6 +8,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S
+from microrad.core.units import format_beyond, format_limit
 from microrad.mission.fields import Quantity, Share
 from microrad.orbit.base import Bounded, OrbitError, States
 from microrad.orbit.earth.epoch import DAY_S, Epoch
@@ -50,8 +51,9 @@ class KeplerOrbit(Bounded):
         Bounded.__post_init__(self)
         height_m = self.semi_major_axis_m * (1.0 - self.eccentricity) - EARTH_RADIUS_M
         if height_m < LOWEST_PERIGEE_M:
+            height = format_beyond(height_m, LOWEST_PERIGEE_M, "m", 6)
             raise OrbitError(
-                f"orbit {self.name}: its perigee is {height_m / 1e3:.6g} km over the equator, below "
+                f"orbit {self.name}: its perigee is {height} over the equator, below "
                 f"{LOWEST_PERIGEE_M / 1e3:.0f} km: it has decayed; raise the altitude or the semi-major axis, or "
                 "lower the eccentricity (a semi-major axis counts from the centre of the Earth)"
             )
@@ -158,20 +160,22 @@ def sun_synchronous_inclination_rad(altitude_m: float, eccentricity: float = 0.0
         eccentricity: Eccentricity, from 0 to below 1.
 
     Raises:
-        OrbitError: Where no inclination does it (above 5974 km for a circular orbit), and for another eccentricity.
+        OrbitError: Where no inclination does it (above 5974 km for a circular orbit), for an altitude not above
+            the centre of the Earth, and for another eccentricity.
     """
     if not 0.0 <= eccentricity < 1.0:
         raise OrbitError(f"the eccentricity {eccentricity:.6g} is not from 0 to below 1; check the elements")
     axis_m = EARTH_RADIUS_M + altitude_m
-    parameter_m = axis_m * (1.0 - eccentricity**2)
-    wanted, cosine = 2.0 * math.pi / TROPICAL_YEAR_S, math.nan
-    if axis_m > 0.0:
-        motion = math.sqrt(MU_M3_S2 / axis_m**3)
-        cosine = -wanted / (1.5 * J2 * (EARTH_RADIUS_M / parameter_m) ** 2 * motion)
+    if not axis_m > 0.0:
+        raise OrbitError(f"an altitude of {altitude_m / 1e3:.6g} km is not above the centre of the Earth; raise it")
+    wanted = 2.0 * math.pi / TROPICAL_YEAR_S
+    turned = 1.5 * J2 * EARTH_RADIUS_M**2 * math.sqrt(MU_M3_S2) / (1.0 - eccentricity**2) ** 2  # rad/s m^(7/2)
+    cosine = -wanted / turned * axis_m**3.5
     if not cosine >= -1.0:
+        most = format_limit((turned / wanted) ** (2.0 / 7.0) - EARTH_RADIUS_M, "m")
         raise OrbitError(
             f"no orbit {altitude_m / 1e3:.6g} km over the equator can be sun-synchronous: the flattening turns its "
-            "node too slowly; take an altitude below 5974 km"
+            f"node too slowly; take an altitude of at most {most}"
         )
     return math.acos(cosine)
 

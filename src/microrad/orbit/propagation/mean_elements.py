@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import format_beyond
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth.epoch import DAY_S, Epoch
 
@@ -207,8 +208,9 @@ class Sgp4Orbit:
             raise self._failed(error, time_s)
         height_m = (satellite.am * (1.0 - satellite.em) - 1.0) * _SGP4_RADIUS_M
         if height_m < LEAST_PERIGEE_HEIGHT_M:
+            height = format_beyond(height_m, LEAST_PERIGEE_HEIGHT_M, "m", 3)
             raise OrbitError(
-                f"{self._where()}: the perigee is {height_m / 1e3:.0f} km high at {self.epoch.utc(time_s)}; below "
+                f"{self._where()}: the perigee is {height} high at {self.epoch.utc(time_s)}; below "
                 f"{LEAST_PERIGEE_HEIGHT_M / 1e3:.0f} km an orbit decays within about a revolution: choose another "
                 "satellite, or an epoch before its decay"
             )

@@ -334,7 +334,7 @@ def _legend(on: Any, drawn: Sequence[Axes], key: Key, room: float, place: Mappin
     look: dict[str, Any] = {"fontsize": "small", "title_fontsize": "small", "facecolor": "inherit" if plain else _DARK}
     look["framealpha"] = None if plain else 1.0
     legend = on.legend([*named.values()], labels, title=key.of.title or None, ncols=columns, **place, **look)
-    for text in legend.get_texts():
+    for text in (*legend.get_texts(), legend.get_title()):
         text.set_parse_math(False)
         if not plain:
             text.set_color(key.of.colour)

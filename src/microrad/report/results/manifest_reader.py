@@ -247,7 +247,7 @@ def _place(folder: Path, number: int, name: str, manifest: ReadManifest) -> str:
             f"text); {_ELSE}"
         )
     own = plain(name)
-    if not own or (folder / own).exists():
+    if not own or (folder / own).exists() or any(each.is_file() for each in (folder / own).parents):
         own = f"named-file-{number}{_ending(name)}"
     _written((folder / own).parent, Path(own).name, manifest.named[name])
     return own

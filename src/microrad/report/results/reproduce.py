@@ -103,9 +103,9 @@ def restored(text: str, moved: Mapping[str, str], written: Callable[[str], str])
         moved: names that they were written under, by those that the mission gives.
         written: how a name stands in the text.
     """
-    for name, own in moved.items():
-        text = text.replace(written(own), written(name))
-    return text
+    names = {written(own): written(name) for name, own in moved.items()}
+    longest_first = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    return re.sub(longest_first, lambda found: names[found[0]], text) if names else text
 
 
 def _in_json(name: str) -> str:
