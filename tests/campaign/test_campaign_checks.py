@@ -340,7 +340,7 @@ def test_an_optimisation_has_variables():
 )
 def test_a_campaign_has_no_more_runs_than_there_are_numbers_for(rows, most_rows, realisations, keys):
     reader = Noting()
-    checks.check_size(reader, rows, most_rows, realisations)
+    checks.check_size(reader, campaign(precision=SimpleNamespace(at_most=9)), rows, most_rows, realisations)
     assert reader.keys == keys
 
 
@@ -841,9 +841,9 @@ ALL_OF_A_CHECK = {
         """,
     ),
     "more runs than there are numbers for": (
-        lambda: noted(checks.check_size, 48, 32, 2**28),
+        lambda: noted(checks.check_size, campaign(precision=SimpleNamespace(at_most=17)), 48, 32, 2**28),
         """
-        precision.at_most = 32 is below the 48 rows of the first round: at least 48 (); runs = makes 32 rows of
+        precision.at_most = 17 is below the 48 rows of the first round: at least 48 (); runs = makes 32 rows of
         268435456 runs each in a cell: at most 2^32 = 4294967296 runs: fewer rows or realisations ()
         """,
     ),
@@ -1297,8 +1297,8 @@ def test_a_value_of_a_campaign_is_told_as_its_file_has_it_without_quotes(value, 
         ("data_rate", 'a data rate with its unit, above 0 bit/s; for example half_width = "0.05 Mbit/s"'),
         ("volume", 'a volume of data with its unit, above 0 bit; for example half_width = "0.05 GB"'),
         ("outage", "a number without quotes, above 0; for example half_width = 0.001"),
-        ("none", "as it was"),
-        (3, "as it was"),
+        ("none", 'a half width in the unit of the output; for example half_width = "0.05 dB"'),
+        (3, 'a half width in the unit of the output; for example half_width = "0.05 dB"'),
     ],
 )
 def test_a_half_width_that_is_missing_is_told_in_the_unit_of_its_output(output, expected):
@@ -1308,7 +1308,8 @@ def test_a_half_width_that_is_missing_is_told_in_the_unit_of_its_output(output, 
     reader.fault("precision.half_width", None, "is wrong", "as it was")
     reader.fault("precision.quantile", None, "is missing", "as it was")
     checks.tell_half_width(reader, output)
-    assert [fault.expected for fault in document.faults] == [expected, "as it was", "as it was"]
+    assert [fault.expected for fault in document.faults[:3]] == [expected, "as it was", "as it was"]
+    assert [fault.reason for fault in document.faults[3:]] == ["is no output"] * (output == "none")
 
 
 def test_of_several_numbers_each_that_is_wrong_is_noted_by_its_own_name():

@@ -1383,6 +1383,18 @@ def test_cells_of_two_axes_run_the_last_fastest_with_sources_of_the_file(tmp_pat
             "each value once",
         ),
         (
+            '"terminals.leo_aperture" = ["5 cm", "50 mm"]',
+            "terminals.leo_aperture",
+            "stands twice, before as 5 cm",
+            "each value once",
+        ),
+        (
+            '"scenario.pid_frequencies" = [["2 Hz", "3 Hz"], ["2000 mHz", "3 Hz"]]',
+            "scenario.pid_frequencies",
+            "stands twice, before as [2 Hz, 3 Hz]",
+            "each value once",
+        ),
+        (
             'mirror = ["mirror.toml", 3]',
             "mirror",
             "is no path",
@@ -1726,3 +1738,25 @@ def test_a_drawn_list_of_an_identified_mirror_goes_by_a_factor_and_leaves_no_unc
     assert m.bouc_wen.alpha_1_v == c.cells[0].mirror.bouc_wen.alpha_1_v, "what is not drawn stays"
     assert alpha not in row.sources or "drawn" not in row.sources[alpha].comment
     assert c.cells[0].mirror.uncertainty is not None
+
+
+@pytest.mark.parametrize(("at_most", "shown"), [(16, "16"), (200, "200")])
+def test_rows_that_are_too_few_are_told_as_they_stand_in_the_file(tmp_path, at_most, shown):
+    (fault,) = faults(tmp_path, HEAD + POWER + PRECISE.format("margin", 0.1, "1 dB", 0.9, at_most))
+    assert (fault.key, fault.value, fault.line) == ("precision.at_most", shown, line_of(tmp_path, "at_most"))
+
+
+def test_a_table_that_holds_only_others_is_told_on_the_line_of_the_first(tmp_path):
+    tail = (
+        '[limits.margin]\nleast = "3 dB"\n[limits.outage]\nmost = 0.1\n[tail]\nerror = "12 urad"\nprobability = 1e-6\n'
+    )
+    (fault,) = faults(tmp_path, HEAD + LOOP + tail)
+    assert (fault.key, fault.line) == ("limits", line_of(tmp_path, "limits.margin"))
+
+
+def test_a_precision_without_half_width_of_what_is_no_output_is_told_both(tmp_path):
+    text = '[precision]\noutput = "margins"\nquantile = 0.1\nconfidence = 0.9\nat_most = 1000\n'
+    found = {fault.key: fault for fault in faults(tmp_path, HEAD + POWER + text)}
+    assert found.keys() == {"precision.output", "precision.half_width"}
+    assert found["precision.output"].nearest == '"margin"'
+    assert "text in quotes" not in found["precision.half_width"].expected

@@ -655,7 +655,7 @@ def test_bounds_hold_and_wide_ones_are_searched_by_ratio():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"evaluations": 15}, "optimise.evaluations: 15 are too few for 1 variables; give at least 16"),
+        ({"evaluations": 15}, "optimise.evaluations: 15 are too few for 1 variable; give at least 16"),
         (
             {"confidence": 0.999},
             "optimise.rows: 400 rows cannot tell whether 99.9 % of them keep a limit; draw at least 1000",

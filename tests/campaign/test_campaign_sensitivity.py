@@ -1,6 +1,7 @@
 """Sensitivities from given rows: against functions whose indices are known, and what must not be said."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -106,7 +107,7 @@ def test_a_function_without_a_surrogate_has_no_total_indices() -> None:
     found = of(x, board)
     assert found.total == {}
     assert found.surrogate_q2 < 0.1
-    assert "surrogate predicts 0% of the variance where 80% are needed" in found.note
+    assert "surrogate predicts 0 % of the variance where 80 % are needed" in found.note
     assert max(i.value for i in found.first.values()) < 0.05
     assert of(x, np.sin(3.0 * x[:, 0]) * x[:, 1]).total != {}
 
@@ -331,3 +332,12 @@ def test_means_over_independent_inputs_are_products_of_those_of_each() -> None:
     assert_allclose(averaged[1], [1.0, 0.5, 1.0, 0.5])
     assert_allclose(averaged[2], [3.0, 3.0, -1.0, -1.0])
     assert_allclose(averaged[0], averaged[1] * averaged[2] * 5.0)
+
+
+@pytest.mark.parametrize(("q2", "told"), [(0.797, "79.7 %"), (0.79999, "79.9 %"), (0.5, "50 %"), (-math.inf, "0 %")])
+def test_a_surrogate_that_just_misses_is_not_told_to_reach_what_is_needed(monkeypatch, q2, told):
+    monkeypatch.setattr("microrad.campaign.statistics.sensitivity._fit", lambda polynomials, y: SimpleNamespace(q2=q2))
+    x = philox(34).random(100)
+    assert sensitivity({"a": x}, x, "margin").note == (
+        f"no total indices: the polynomial surrogate predicts {told} of the variance where 80 % are needed"
+    )

@@ -947,3 +947,19 @@ def test_the_mean_of_weighted_rows_is_worth_its_squares() -> None:
     assert found.deviation == math.sqrt(found.variance)
     lone = moments(np.array([3.0]), np.array([0.5]))
     assert math.isnan(lone.variance) and math.isnan(lone.mean_variance) and lone.mean == 3.0
+
+
+def test_of_rows_that_have_all_failed_no_figure_is_spoken_of() -> None:
+    drawn = a_campaign(draws=(SimpleNamespace(drawn_as=object()),))
+    lost = CellRows(drawn, 0, [a_chunk(0, range(3), [0, 1, 2], margin=[math.nan] * 3)])
+    assert summary._warnings(drawn, [lost]) == ("No row has a result: there are no figures.",)
+
+
+@pytest.mark.parametrize(
+    ("share", "told"), [(0.9999999, "99.99999 %"), (0.57, "57 %"), (0.123456789, "12.3456789 %"), (1e-4, "0.01 %")]
+)
+def test_a_share_of_a_precision_is_told_with_every_digit_that_it_has(share, told) -> None:
+    campaign = a_campaign(("data_rate",), half_width=1e6)
+    campaign.table.precision = SimpleNamespace(output="data_rate", quantile=share, confidence=share)
+    words = CellRows(campaign, 0, [a_chunk(0, range(400), data_rate=1e8 + np.arange(400.0))]).precision_words()
+    assert words.startswith(f"{told} quantile of ") and f" at {told} confidence; " in words

@@ -571,3 +571,9 @@ def test_levels_cover_two_deviations_about_the_error_less_what_lines_make() -> N
     far = importance_sampling._levels(pilot, straight, 0.75, 600.0, np.array([2.0, 0.5]))
     assert far == pytest.approx((45.75, 47.0))
     assert importance_sampling._levels(pilot, -straight, 0.75, 6.0, np.array([2.0, 0.5]))[0] == 0.0
+
+
+def test_a_tail_of_one_row_or_run_is_told_in_the_singular():
+    one = tail_of_time(np.array([1.0, 0.5, 0.0]), np.array([1.0, 0.25, 0.0]), 1, np.arange(3.0), (0.1,), 0.9)
+    assert one.method == "share of the time of 1 row"
+    assert tail_weighted(np.ones(1), np.zeros(1), (0.1,), 0.9).method == "importance sampling of the noise in 1 run"

@@ -9,7 +9,7 @@ from scipy import integrate, optimize, stats
 
 from link_files import RECEIVERS, link_file, received_with
 from microrad import link
-from microrad.core.capacity import Code, _OnOff, untold_of_a_sign
+from microrad.core.capacity import Code, _OnOff, excess_noise_factor, untold_of_a_sign
 from microrad.core.capacity import entropy as binary_entropy
 from microrad.link import receivers
 from microrad.mission.toml import MissionError
@@ -192,3 +192,29 @@ def test_counts_that_no_signal_tells_apart_have_no_exponent():
     assert line.exponent(1e-20, 3.0) == 0.0
     assert line.exponent(1.5, 0.0) == 3.0
     assert 0.0 < line.exponent(1.5, 3.0) < 3.0
+
+
+GAINS = """ppm_counting           | 6.52305274 5.19360058 20.0291178 2.81217651
+ppm_counting 16 0.3    | 6.36312968 5.19360058 16.1436176 2.81217651
+ppm_counting 8 0.0     | 6.52305274 5.19360058 20.0291178 2.81217651
+ook_counting 1.9 0.1   | 9.9271828 7.60237303 28.8960184 4.10628372
+ook_counting 1.9 .1 .4 | 7.7265519 5.64580006 19.6395146 2.83767312
+ook_current 1.8 0.2    | 11.5297064 8.18849787 31.0422248 2.81434878
+ook_current 1.8 .2 3.5 | 32.8963909 22.7910141 95.9130574 6.78223345
+ook_preamplified       | 7.43227414 5.10284921 18.0677585 1.98019858
+phases                 | 7.06330693 5.44638587 25.9477335 1.49498576
+dpsk_preamplified      | 10.3358185 7.1724824 28.8953508 3.89634148"""
+
+
+@pytest.mark.parametrize("line", GAINS.splitlines())
+def test_the_largest_gains_of_codes_unlike_each_other(line):
+    called, gains = line.split("|")
+    name, *given = called.split()
+    given = [int(each) if each.isdigit() else float(each) for each in given]
+    codes = Code(0.8, 1e-6), Code(0.33, 1e-3), Code(1e-5, 1e-9), Code(1.0, 0.2)
+    assert [getattr(code, name)(*given) for code in codes] == pytest.approx([*map(float, gains.split())], rel=1e-6)
+
+
+@pytest.mark.parametrize(("gain", "ratio", "factor"), [(1, 0.3, 1), (10, 0, 1.9), (10, 0.2, 3.52), (40, 1, 40)])
+def test_excess_noise_is_mcintyres(gain, ratio, factor):
+    assert excess_noise_factor(gain, ratio) == pytest.approx(factor, rel=1e-12)

@@ -299,3 +299,70 @@ def test_an_error_of_a_file_elsewhere_names_that_file_and_one_of_the_draft_its_p
         with pytest.raises(OSError) as caught, folder.naming(draft, place):
             raise OSError(errno.ENOSPC, "full", at if isinstance(at, bytes) else str(at))
         assert (caught.value.errno, caught.value.strerror, caught.value.filename) == (errno.ENOSPC, "full", str(named))
+
+
+@pytest.mark.parametrize(
+    ("path", "argument"),
+    [
+        ("a b", "a b"),
+        ("-a", "./-a"),
+        ("--x/y", "./--x/y"),
+        ("a/-b", "a/-b"),
+        ("./-c", "./-c"),
+        ("/-d", "/-d"),
+        (".", "."),
+    ],
+)
+def test_a_path_that_begins_like_an_option_is_led_by_its_folder(path, argument):
+    assert folder.path_argument(Path(path)) == argument
+
+
+@pytest.mark.parametrize(
+    ("manifest", "kind", "ours"),
+    [
+        ('{"versions": {"microrad": "1"}, "mission": {}}', "mission", True),
+        ('{"versions": {"microrad": "1"}, "mission": null}', "mission", True),
+        ('{"versions": {"microrad": "1"}, "mission": {}}', "bench", False),
+        ('{"versions": {"numpy": "1"}, "mission": {}}', "mission", False),
+        ('{"versions": ["microrad"], "bench": 1}', "bench", True), ('{"mission": {}}', "mission", False),
+        ('{"versions": 3, "mission": {}}', "mission", False), ('[{"versions": {}}]', "mission", False),
+        ("", "mission", False),
+        ('{"versions": {"microrad"', "mission", False), ("\xff", "mission", False), ("null", "mission", False),
+    ],
+)  # fmt: skip
+def test_a_folder_is_ours_by_the_versions_and_the_kind_of_its_manifest(tmp_path, manifest, kind, ours):
+    (tmp_path / "manifest.json").write_bytes(manifest.encode("latin-1"))
+    said = f"{tmp_path} already holds parts" if ours else f"{tmp_path} holds files that are not parts of microrad"
+    end = ", or replace them with --overwrite" if ours else ""
+    with pytest.raises(folder.FolderError) as refused:
+        folder.check_folder(tmp_path, False, kind, "parts")
+    assert str(refused.value) == f"{said}: choose another --output{end}"
+
+
+@pytest.mark.parametrize(
+    ("content", "mode", "held"),
+    [
+        ("a\r\nµ", None, b"a\r\n\xc2\xb5"),
+        (b"\x00\xff", 0o600, b"\x00\xff"),
+        ("", 0o640, b""),
+        ("x" * 99, 0o444, b"x" * 99),
+    ],
+)
+def test_a_file_is_written_with_its_line_ends_and_its_mode_in_place_of_another(tmp_path, content, mode, held):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    for durable in (True, False):
+        write_whole(path, content, durable=durable, mode=mode)
+        assert (path.read_bytes(), [*tmp_path.iterdir()]) == (held, [path])
+        assert mode is None or path.stat().st_mode & 0o777 == mode
+
+
+def test_a_draft_beside_a_file_goes_whatever_it_has_become(tmp_path):
+    for make in (Path.touch, Path.mkdir, lambda draft: None):
+        with folder.draft_beside(tmp_path / "a") as draft:
+            assert (draft.parent, draft.suffix) == (tmp_path, folder.DRAFT)
+            make(draft)
+        assert not [*tmp_path.iterdir()]
+    with folder.whole_file(tmp_path / "b") as draft:
+        draft.write_text("b")
+    assert (tmp_path / "b").read_text() == "b"

@@ -269,7 +269,7 @@ def test_a_modal_form_from_roots_is_the_product_over_them_with_unit_magnitude_wh
 @pytest.mark.parametrize(
     ("zeros", "poles", "words"),
     [
-        ([-1.0], [-2.0], "1 zeros over 1 poles: not strictly proper"),
+        ([-1.0], [-2.0], "1 zero over 1 pole: not strictly proper"),
         ([], [-2.0, -2.0], "two poles coincide"),
         ([2j * pi, -2j * pi], [-1.0, -2.0, -3.0], "vanishes at 1 Hz"),
     ],

@@ -108,3 +108,42 @@ def test_ratios_have_the_shape_of_the_amplitudes(quadratures):
         for amplitude in (np.zeros((0,)), np.ones((2, 3)), np.ones(300), np.asarray(2.0)):
             assert phase_error.bit_error_ratio(amplitude, rms_rad, quadratures).shape == amplitude.shape
     assert phase_error.bit_error_ratio(np.zeros(1), 0.1, quadratures) == pytest.approx([0.5], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "rms_rad", "two", "four"),
+    [
+        (1e-3, 0.2, 3.16813588, 4.61622137), (1e-9, 0.05, 6.00566752, 6.32422092), (0.1, 0.5, 1.49260844, 2.12431917),
+        (0.3, 0.9, 0.8147916, 0.901145238), (1e-15, 0.01, 7.94174366, 7.96706256),
+        (0.45, 1.0, 0.207758282, 0.208876548),
+    ],
+)  # fmt: skip
+def test_an_amplitude_of_two_and_of_four_phases_gives_the_ratio_by_a_quadrature_of_its_own(ratio, rms_rad, two, four):
+    found = [phase_error.amplitude_for(ratio, rms_rad, quadratures) for quadratures in (1, 2)]
+    assert found == pytest.approx([two, four], rel=1e-6)
+    for quadratures, amplitude in enumerate(found, 1):
+        assert averaged(amplitude, rms_rad, quadratures) == pytest.approx(ratio, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rms_rad", "two", "four"),
+    [
+        (0.15, 1.16192477e-25, 8.20524160e-08), (0.35, 7.18984698e-06, 0.0124163695), (1.0, 0.116227517, 0.225298676),
+        (0.62, 0.0112916059, 0.102690807),
+    ],
+)  # fmt: skip
+def test_a_floor_is_the_share_of_the_time_beyond_a_quarter_or_an_eighth_of_a_turn(rms_rad, two, four):
+    assert phase_error.floor(rms_rad, 1) == pytest.approx(two, rel=1e-6)
+    assert phase_error.floor(rms_rad, 2) == pytest.approx(four, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "two", "four"),
+    [
+        (1e-12, 0.22029238, 0.111649722), (2e-6, 0.330455736, 0.170317294), (0.03, 0.723839128, 0.417588676),
+        (0.2, 1.0, 0.913834208), (0.45, 1.0, 1.0),
+    ],
+)  # fmt: skip
+def test_the_largest_phase_error_of_a_ratio_is_no_larger_than_one_that_is_locked(ratio, two, four):
+    assert phase_error.largest_rms_rad(ratio, 1) == pytest.approx(two, rel=1e-6)
+    assert phase_error.largest_rms_rad(ratio, 2) == pytest.approx(four, rel=1e-6)

@@ -113,3 +113,27 @@ def test_no_gain_in_background_passes_the_bound_which_is_near(code, background):
     gain, bound = 10.0 ** (float(counter.net_gain_db(rate)) / 10.0), Code(*code).ppm_counting(order, background)
     assert 10.0**-0.13 * bound < gain <= bound * (1.0 + 1e-9)
     assert bound <= Code(*code).ppm_counting()
+
+
+@pytest.mark.parametrize(
+    ("order", "pulse", "background", "bits"),
+    [
+        (2, 3.0, 0.7, 0.770915347), (3, 0.2, 5.0, 0.00377524823), (64, 9.0, 0.02, 5.99756678), (4, 300.0, 2.0, 2.0),
+        (256, 40.0, 25.0, 7.99494499), (16, 1e-3, 1.0, 6.76023889e-07), (7, 2.5, 1e-17, 2.57691375),
+    ],
+)  # fmt: skip
+def test_what_a_pulse_tells_of_its_slot_in_orders_and_backgrounds_unlike_each_other(order, pulse, background, bits):
+    assert soft_bits(order, pulse, background) == pytest.approx(bits, rel=1e-6)
+    if order < 4:
+        assert summed(order, pulse, background) == pytest.approx(bits, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("order", "share", "background", "counts"),
+    [
+        (2, 0.5, 0.7, 1.74572161), (3, 0.9, 5.0, 8.35474361), (64, 0.33, 0.02, 0.683510697), (5, 0.75, 0.0, 1.38629436),
+        (256, 0.99, 25.0, 31.7023617), (16, 0.05, 1.0, 0.599025205), (9, 0.75, 1e-16, 1.38629436),
+    ],
+)  # fmt: skip
+def test_the_least_pulse_of_a_share_in_orders_and_backgrounds_unlike_each_other(order, share, background, counts):
+    assert least_pulse_counts(order, share, background) == pytest.approx(counts, rel=1e-6)

@@ -9,8 +9,10 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from datetime import date, datetime, time, timedelta
 from enum import Enum
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -256,3 +258,60 @@ assert [path[-1] for path in reads.digests if path[1:]] == ["power_w"], reads.di
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, "")
+
+
+@dataclass(frozen=True)
+class Swapped:
+    waist_m: float
+    power_w: float
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (date(2026, 1, 2), date(2026, 1, 3)), (datetime(2026, 1, 2), date(2026, 1, 2)), (time(1, 2), time(2, 1)),
+        (timedelta(seconds=1), timedelta(seconds=2)), (Path("a/b"), PureWindowsPath("a/b")),
+        ({1: 2, 3: 4}, {3: 4, 1: 2}),
+        ({"a": 1}, {"a": 2}), ({1}, frozenset({1, 2})), (slice(1, 2, 3), slice(1, 2, 4)), (slice(1, 9), slice(2, 9)),
+        ([], ()), ([], [None]), (range(3), range(4)), (functools.partial(max, 1), functools.partial(min, 1)),
+        (functools.partial(round, 1.0), functools.partial(round, 1.0, ndigits=2)), (Beam(1.0, 2.0), Swapped(2.0, 1.0)),
+        (Table(rate_hz=1.0), Table(rate_hz=1.0, mode="")), (np.zeros(2, np.float32), np.zeros(2)), (math.nan, math.inf),
+        (np.arange(4).reshape(2, 2), np.arange(4).reshape(2, 2).T), (np.zeros(0), np.zeros((0, 1))), (b"", ""), (0, ""),
+        (np.int32(1), np.int64(1)), (np.array(1.0), np.array([1.0])), ("a\0b", "ab"),
+        (Kind.LEFT, "left"),
+        ((("a", "b"), "c"), ("a", ("b", "c"))), (("a", "bc"), ("ab", "c")), ((1, 23), (12, 3)), (len, sum),
+        (dict, list), (np.array([1, 2], ">i4"), np.array([1, 2], "<i4")),
+    ],
+)  # fmt: skip
+def test_values_that_are_nearly_alike_have_digests_of_their_own(one, other):
+    assert digest(one) != digest(other)
+
+
+def test_views_of_an_array_have_the_digest_of_what_is_in_them():
+    whole = np.arange(12.0).reshape(3, 4)
+    assert (
+        digest(whole[:, ::2]) == digest(np.ascontiguousarray(whole[:, ::2])) == digest(np.asfortranarray(whole[:, ::2]))
+    )
+    assert digest({3, 1, 2}) == digest({2, 3, 1}) and digest({"a": 1}) == digest(MappingProxyType({"a": 1}))
+
+
+@pytest.mark.parametrize(
+    ("function", "paths"),
+    [
+        (lambda m: None, ["0"]),
+        (lambda m: m.beam.waist_m, ["0", "0 beam", "0 beam waist_m"]),
+        (lambda m: m.beams[1].power_w, ["0", "0 beams", "0 beams 0", "0 beams 1", "0 beams 1 power_w"]),
+        (lambda m: (m.samples, m.samples), ["0", "0 samples"]),
+        (lambda m: m.loop.period_s, ["0", "0 loop", "0 loop rate_hz"]),
+    ],
+)
+def test_what_is_read_stands_under_the_steps_that_lead_to_it(function, paths):
+    _, reads = watched_call(function, MISSION)
+    assert [" ".join(map(str, path)) for path in reads.digests if path] == paths and reads.known
+
+
+def test_arguments_beside_and_what_has_no_digest_are_known_for_what_they_are():
+    result, reads = watched_call(lambda a, *, b: (a, b), 1.5, b=object)
+    assert (result, reads.known, list(reads.digests)) == ((1.5, object), True, [()])
+    _, reads = watched_call(lambda m, x: m.beam.power_w, MISSION, iter([]))
+    assert not reads.known

@@ -513,3 +513,148 @@ def test_what_a_limit_is_told_as_keeps_it(limit, digits):
 )
 def test_a_plain_number_has_no_power_of_ten_where_it_is_large(value, digits, text):
     assert units.plain(value, digits) == text
+
+
+@pytest.mark.parametrize(
+    ("unit", "noun", "example"),
+    [line.split(" | ") for line in """m | a length | m
+kg | a mass | kg
+s | a time | s
+V | a voltage | V
+W | a power | W
+Hz | a frequency | Hz
+rad | an angle | urad
+dB | a ratio in decibels | dB
+bit | a volume of data | GB
+bit/s | a data rate | Mbit/s
+photon/bit | a receiver sensitivity | photon/bit
+W/m^2 | an irradiance | W/m^2
+W/sr | a radiant intensity | MW/sr
+W/(m^3 sr) | a spectral radiance | W/(m^2 sr um)
+1/s | a rate per second | 1/s
+m/s | a velocity | km/s
+V/s | a voltage rate | V/s
+rad/V | an angle per voltage | mrad/V
+V/rad | a voltage per angle | V/mrad
+V/(rad s) | a voltage per angle and time | V/(mrad s)
+V s/rad | a voltage per angular rate | V s/mrad
+rad/s | an angular rate | urad/s
+rad^2/Hz | a spectral density of an angle | urad^2/Hz
+rad/Hz^2 | an angle per squared frequency | nrad/Hz^2
+A | a current | nA
+A/W | a responsivity | A/W
+A/sqrt(Hz) | a noise density of a current | pA/sqrt(Hz)
+K | a quantity in K | K
+rad^3/s | a quantity in rad^3/s | rad^3/s""".splitlines()],
+)  # fmt: skip
+def test_a_number_alone_is_told_the_kind_that_is_wanted_and_its_usual_unit(unit, noun, example):
+    with pytest.raises(UnitError) as refused:
+        parse_quantity(2.75, unit)
+    said = f'2.75 is a number without a unit; expected {noun} with its unit, for example "2.75 {example}"'
+    assert str(refused.value) == said
+    assert (refused.value.reason, refused.value.expected) == ("is a number without a unit", f"{noun} with its unit")
+    assert units.kind_of(unit) == (noun, example)
+
+
+@pytest.mark.parametrize(
+    ("spelled", "unit", "meant"),
+    [
+        ("bps", "bit/s", "bit/s"), ("gbps", "bit/s", "Gbit/s"), ("Tbits/s", "bit/s", "Tbit/s"), ("watts", "W", "W"),
+        ("mB/s", "bit/s", ""), ("bit/SEC", "bit/s", "bit/s"), ("kbit/sec", "bit/s", "kbit/s"), ("meter", "m", "m"),
+        ("metres", "m", "m"), ("Meters", "m", "m"), ("metre", "m", "m"), ("micron", "m", "um"), ("Microns", "m", "um"),
+        ("micrometer", "m", "um"), ("micrometres", "m", "um"), ("micrometers", "m", "um"), ("micrometre", "m", "um"),
+        ("degree", "rad", "deg"), ("°", "rad", "deg"), ("radian", "rad", "rad"), ("Radians", "rad", "rad"),
+        ("microradian", "rad", "urad"), ("microradians", "rad", "urad"), ("volt", "V", "V"), ("Volts", "V", "V"),
+        ("sec", "s", "s"), ("secs", "s", "s"), ("second", "s", "s"), ("seconds", "s", "s"), ("hertz", "Hz", "Hz"),
+        ("cps", "Hz", "Hz"), ("cps", "rad/s", ""), ("degrees", "m", ""), ("watts", "V", ""), ("dbm", "W", ""),
+    ],
+)  # fmt: skip
+def test_a_unit_that_is_often_spelled_otherwise_is_named_with_the_number_before_it(spelled, unit, meant):
+    with pytest.raises(UnitError) as refused:
+        parse_quantity(f"-7.25 {spelled}", unit, "typical")
+    said = f'"-7.25 {spelled}" has "{spelled}"'
+    noun = units.kind_of(unit)[0]
+    odd = re.sub("^bit/|/s$", "", spelled)
+    said += f", which is written {meant} here" if meant else f' where a unit should stand: no unit is called "{odd}"'
+    given = f"-7.25 {meant}" if meant else "5 typical"
+    assert str(refused.value) == f'{said}; expected {noun} with its unit, for example "{given}"'
+    if meant:
+        assert math.isfinite(parse_quantity(refused.value.example, unit))
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "digits", "text"),
+    [
+        (9.9996, "kg", 4, "10 kg"), (1500.0, "kg", 3, "1500 kg"), (1e-13, "m", 3, "0.1 pm"), (1e7, "m", 3, "10000 km"),
+        (2.5e13, "Hz", 4, "25 THz"), (2.5e16, "Hz", 4, "25000 THz"), (0.05, "Hz", 2, "50 mHz"), (7e6, "W", 2, "7 MW"),
+        (2e-6, "Hz", 3, "0.002 mHz"), (7e10, "W", 2, "70 GW"), (0.3, "K", 2, "300 mK"), (4e-5, "K", 2, "0.04 mK"),
+        (3e3, "s", 3, "3000 s"), (120.0, "min", 3, "120 min"), (8e9, "bit", 3, "8 Gbit"), (1e6, "V", 3, "1 MV"),
+        (2.2e-3, "deg", 3, "2.2 mdeg"), (0.5, "arcsec", 3, "500 marcsec"), (5e-3, "bit/s", 3, "0.005 bit/s"),
+        (1e-11, "A/W", 3, "10 pA/W"), (1e4, "A", 3, "10 kA"), (3e-7, "sr", 3, "3e-07 sr"), (1e8, "B", 3, "100 MB"),
+        (-math.inf, "m", 3, "-inf m"), (2.5e9, "J", 3, "2.5 GJ"), (4.4e7, "N", 2, "44 MN"), (0.05, "photon", 2,
+        "0.05 photon"), (9.5e-4, "V s/rad", 2, "950 µV s/rad"), (0.0095, "day", 2, "0.0095 day"), (5e-5, "h", 2,
+        "5e-05 h"), (12.0, "dBm", 3, "12 dBm"), (1e-3, "dB", 3, "0.001 dB"), (9.4e5, "byte", 2, "940 kbyte"),
+    ],
+)  # fmt: skip
+def test_a_prefix_is_one_that_the_unit_takes_and_else_none(value, unit, digits, text):
+    assert format_quantity(value, unit, digits) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "kept", "shown"),
+    [
+        ("a\nb\tc", "", "a\\u000ab\\u0009c"), ("a\nb\tc", "\n", "a\nb\\u0009c"), ("é ✓", "", "é ✓"), ("", "", ""),
+        ("\u202eabc\u00a0", "", "\\u202eabc\\u00a0"), ("\u00a0x\u202f\t\n\r", units.BLANKS, "\u00a0x\u202f\t\n\\u000d"),
+        ("\x7f\x1b[0m", "", "\\u007f\\u001b[0m"), ("\U0001f600\ue000", "", "\U0001f600\\ue000"),
+    ],
+)  # fmt: skip
+def test_what_steers_a_terminal_is_spelled_out_unless_it_is_kept(text, kept, shown):
+    assert units.printable(text, kept) == shown
+
+
+@pytest.mark.parametrize(
+    ("given", "unit", "said", "example"),
+    [
+        ("x" * 61, "m", f'"{"x" * 60}…" has 61 characters, too many for a quantity', "5 m"),
+        ("1 dBW", "dBm", '"1 dBW" is in dBW, another kind of quantity', "5 dBm"),
+        ("-1000.5 dBW", "W", '"-1000.5 dBW" is beyond 1000 dBW', "5 W"),
+        (b"5 m", "m", "a value of type bytes is not a quantity in quotes", "5 m"),
+        (False, "bit/s", "a value of type bool is not a quantity in quotes", "5 Mbit/s"),
+        (1j, "rad/V", "a value of type complex is not a quantity in quotes", "5 mrad/V"),
+        ("3 \n", "s", '"3 \\u000a" has "\\u000a" where a unit should stand: no unit is called "\\u000a"', "5 s"),
+        ("3\tm", "m", '"3\\u0009m" has "\\u0009m" where a unit should stand: no unit is called "\\u0009m"', "5 m"),
+        ("-4.5e2", "rad", '"-4.5e2" is a number without a unit', "-4.5e2 urad"),
+        ("6 kW", "W/sr", '"6 kW" is in "kW", another kind of quantity', "5 MW/sr"),
+        ("6 1/", "s", '"6 1/" has "1/" where a unit should stand: a unit is missing beside a space or a stroke', "5 s"),
+        ("6 m^2^2", "m", '"6 m^2^2" has "m^2^2" where a unit should stand: no unit is called "m^2^2"', "5 m"),
+    ],
+)
+def test_a_refused_quantity_is_shown_as_it_stands_with_the_example_of_its_kind(given, unit, said, example):
+    with pytest.raises(UnitError) as refused:
+        parse_quantity(given, unit)
+    assert str(refused.value) == f'{said}; expected {units.kind_of(unit)[0]} with its unit, for example "{example}"'
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("3 V s /mrad", "V s/rad", 3000.0), ("2 min^2", "s^2", 7200.0), ("6 kg m2/s2", "J", 6.0), ("9 J/day", "W",
+        9.0 / 86400.0), ("4 GB/h", "bit/s", 32e9 / 3600.0), ("0 dBm", "W", 1e-3), ("-30 dBW", "W", 1e-3), ("5 dBm",
+        "dBm", 5.0), ("-7.5 dBW", "dBW", -7.5), ("8 V A", "W", 8.0), ("-0 m", "m", 0.0), ("2 /s", "1/s", None),
+        ("2 m/(s s)", "m/s^2", 2.0), ("2 sqrt(m) sqrt(m)", "m", 2.0), ("3 1/(ms mV)", "1/(V s)", 3e6), ("7. m9",
+        "m9", 7.0), ("1 arcsec", "rad", math.pi / 648000.0), ("2 rad^2", "sr", 2.0), ("3 nm/pm", "m/m", 3000.0),
+    ],
+)  # fmt: skip
+def test_units_in_any_order_and_power_are_the_same_quantity(text, unit, value):
+    if value is None:
+        with pytest.raises(UnitError, match="a unit is missing beside a space or a stroke"):
+            parse_quantity(text, unit)
+    else:
+        assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-14, abs=0.0)
+
+
+@pytest.mark.parametrize(("letters", "shown"), [(59, "x" * 59), (60, "x" * 60), (61, "x" * 60 + "…")])
+def test_a_text_is_shown_up_to_as_many_letters_as_a_quantity_may_have(letters, shown):
+    with pytest.raises(UnitError) as refused:
+        parse_quantity("x" * letters, "m")
+    assert str(refused.value).startswith(f'"{shown}" ')

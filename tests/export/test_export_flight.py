@@ -337,7 +337,7 @@ def test_actuators_that_rest_at_different_biases_are_refused():
 
 def test_a_controller_of_several_axes_that_leaves_too_much_is_refused(tmp_path):
     chosen = replace(designs.of_three_actuators(), left=Outlook(1e-6, 2e-6))
-    with pytest.raises(ExportError, match=r"LQG leaves 2 µrad rms an axis .* 2\.00 times the 1 µrad"):
+    with pytest.raises(ExportError, match=r"LQG leaves 2 µrad rms an axis .* 2 times the 1 µrad"):
         export_flight(chosen, tmp_path / "flight")
     assert list(tmp_path.iterdir()) == []
 
@@ -1195,7 +1195,7 @@ def test_a_controller_that_leaves_too_much_is_refused_with_both_figures_unless_a
         choice.promised(chosen)
     assert str(error.value) == (
         "m.toml: quick PI leaves 4.5 µrad rms an axis on the mission's mirror, simulated "
-        "with its hysteresis: 4.50 times the 1 µrad rms an axis of linear theory, where "
+        "with its hysteresis: 4.5 times the 1 µrad rms an axis of linear theory, where "
         "1.5 times is the most. Choose another controller by the simulated figures of "
         "microrad design, or write this one all the same with --accept."
     )
@@ -1467,3 +1467,14 @@ def test_a_run_of_the_paper_follows_its_fastest_sine_and_reads_in_steps_of_its_s
     assert found.inputs[:, 0].tolist() == ([0.2, 0.3, -0.75, 1.3] if resolution == 0.0 else [0.0, 0.5, -0.5, 1.5])
     assert_array_equal(found.inputs[:, 1:], reference)
     assert (found.commands.tolist(), found.saturated, found.rate_clamped) == ((10.0 * output).tolist(), 3, 5)
+
+
+@pytest.mark.parametrize(("times", "told"), [(1.503, "1.503"), (1.50004, "1.501"), (1.6, "1.6"), (12.34567, "12.35")])
+def test_a_ratio_beyond_the_most_is_not_told_as_the_most(times, told):
+    chosen = SimpleNamespace(
+        left=Outlook(1e-6, times * 1e-6), controller=SimpleNamespace(name="PI"), source=SimpleNamespace(path="m.toml")
+    )
+    with pytest.raises(
+        ExportError, match=f": {told} times the 1 µrad rms an axis of linear theory, where 1.5 times is"
+    ):
+        choice.promised(chosen)

@@ -320,7 +320,7 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         ({"note": "text"}, r"has no linear system; it holds note, and none with A B C D, z p k or num den"),
         ({"A": np.eye(2)}, r"has no linear system; it holds A"),
         ({"s": np.array([(1, 2), (3, 4)], dtype=[("num", "O"), ("den", "O")])}, "an array of 2 structures"),
-        (TWO, "2 inputs and 1 outputs; a mirror file has one drive and one angle"),
+        (TWO, "2 inputs and 1 output; a mirror file has one drive and one angle"),
         (states(B=np.ones((4, 1))), r"B has shape \(4, 1\), where \(3, 1\) fits"),
         (states(A=np.ones((3, 2))), r"A has shape \(3, 2\), where \(3, 3\) fits"),
         (states(A=STATES.A + 1j), "A holds complex numbers"),
@@ -350,7 +350,7 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         (sampled_roots([complex(-0.9, 1e-8), complex(-0.9, -1e-8)]), r"negative real axis, \|z\| = 0\.9 at 2\.5e"),
         (sampled_roots([0.0, 0.9]), "a pole at 0, a delay of a whole sample"),
         (sampled_roots([0.5, 0.5]), r"two poles coincide, \|z\| = 0\.5"),
-        (sampled_roots([0.5], [0.2]), "1 zeros over 1 poles, its output follows the drive within a sample"),
+        (sampled_roots([0.5], [0.2]), "1 zero over 1 pole, its output follows the drive within a sample"),
         (
             states(Ts=2e-5, A=np.diag([0.4, 0.5, 0.6]), B=np.ones((3, 1)), C=np.ones((1, 3)), D=np.ones((1, 1))),
             "within a sample",
@@ -376,8 +376,8 @@ HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.on
         ),
         (roots(zeros=[0.0]), "a zero at 0 Hz: the mirror does not hold an angle"),
         (roots(k=-GAIN), "the output falls as the drive rises"),
-        ({"num": [[1.0, 2.0]], "den": [[1.0, 2.0]]}, "1 zeros over 1 poles, not strictly proper"),
-        ({"num": [[1.0, 2.0, 1.0]], "den": [[1.0, 2.0]]}, "2 zeros over 1 poles, not strictly proper"),
+        ({"num": [[1.0, 2.0]], "den": [[1.0, 2.0]]}, "1 zero over 1 pole, not strictly proper"),
+        ({"num": [[1.0, 2.0, 1.0]], "den": [[1.0, 2.0]]}, "2 zeros over 1 pole, not strictly proper"),
         ({"num": [[0.0]], "den": [[1.0, 2.0]]}, "the numerator is zero"),
         ({"num": [[1.0]], "den": [[0.0, 0.0]]}, "the denominator is zero"),
         ({"num": [[1.0]], "den": np.ones((1, 62))}, "order 61, and a mirror has at most 60"),
@@ -504,12 +504,12 @@ def test_pickles_are_not_opened(tmp_path):
     ("system", "why"),
     [
         (python_control.ss(-np.eye(2), np.eye(2), np.eye(2), 0), "2 inputs and 2 outputs"),
-        (python_control.tf([[[1.0], [2.0]]], [[[1.0, 5.0], [1.0, 6.0]]]), "2 inputs and 1 outputs"),
-        (python_control.tf([[[1.0]], [[2.0]]], [[[1.0, 5.0]], [[1.0, 6.0]]]), "1 inputs and 2 outputs"),
+        (python_control.tf([[[1.0], [2.0]]], [[[1.0, 5.0], [1.0, 6.0]]]), "2 inputs and 1 output"),
+        (python_control.tf([[[1.0]], [[2.0]]], [[[1.0, 5.0]], [[1.0, 6.0]]]), "1 input and 2 outputs"),
         (python_control.tf([1.0], [1.0, -0.5], 0.01), "the band ends at 5000 Hz"),
         (python_control.tf([1.0], [1.0, -0.5], None), "dt = None: continuous, or sampled how fast"),
         (python_control.tf([1.0], [1.0, -0.5], True), "dt = True: continuous, or sampled how fast"),
-        (python_control.tf([1.0, 0.0, 0.0], [1.0, 1.0]), "2 zeros over 1 poles, not strictly proper"),
+        (python_control.tf([1.0, 0.0, 0.0], [1.0, 1.0]), "2 zeros over 1 pole, not strictly proper"),
         (python_control.tf([1.0], [1.0, -5.0]), "unstable, a pole at 0.7958 Hz"),
         (python_control.frd([1.0, 2.0], [1.0, 2.0]), "a FrequencyResponseData; give a control.StateSpace or"),
         (SimpleNamespace(A=1), "a SimpleNamespace; give a control.StateSpace or"),
@@ -692,7 +692,7 @@ def test_each_refusal_says_what_was_found_where_and_what_to_do(tmp_path):
         "no gain": "(folder)/model.mat: a gain of 0.0; the mirror does not move: check the model",
         "gains": "(folder)/model.mat: k has 3 gains; choose one input and one output",
         "a jump": (
-            "(folder)/model.mat: 2 zeros over 1 poles, not strictly proper; a mirror does not "
+            "(folder)/model.mat: 2 zeros over 1 pole, not strictly proper; a mirror does not "
             "follow a jump at once: add the pole that ends its band"
         ),
         "a matrix of roots": (

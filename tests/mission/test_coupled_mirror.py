@@ -515,6 +515,7 @@ def test_what_is_wrong_is_told_once_with_its_key_and_a_remedy(name):
     lines = {statement.key: statement.line for statement in scan(text)}
     parts = key.split(".")
     there = [".".join(parts[:n]) for n in range(len(parts), 0, -1) if ".".join(parts[:n]) in lines]
+    there += [each for each in lines if each.startswith(f"{key}.")]  # a table that only has others inside it
     assert fault.line == (lines[there[0]] if there else 0)
 
 

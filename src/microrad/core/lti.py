@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import counted
 
 EXACT_BITS = 32
 """Significant bits (2e-10) of what a simulated loop is made of. Where its converters and reversals decide, a difference
@@ -88,7 +89,7 @@ def modal_from_roots(zeros: Complexes, poles: Complexes, unit_at_hz: float) -> S
         ValueError: Where it is not strictly proper, two poles coincide, or it vanishes at that frequency.
     """
     if zeros.size >= poles.size:
-        raise ValueError(f"{zeros.size} zeros over {poles.size} poles: not strictly proper")
+        raise ValueError(f"{counted(zeros.size, 'zero')} over {counted(poles.size, 'pole')}: not strictly proper")
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
     if poles.size > 1 and np.min(distance / np.abs(poles)[:, None].clip(1e-300)) < 1e-9:
         raise ValueError("two poles coincide: the transfer function has no modal form")

@@ -334,6 +334,16 @@ def plain(value: float, digits: int = 3) -> str:
     return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
+def counted(number: int, noun: str) -> str:
+    """A number with its noun: "1 parameter", "2 parameters".
+
+    Args:
+        number: How many.
+        noun: In the singular.
+    """
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 def format_input(value: float, unit: str) -> str:
     """A quantity in words with every digit that it was given with; one that was computed gets four digits.
 

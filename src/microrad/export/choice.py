@@ -14,7 +14,7 @@ from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.core.units import format_quantity
+from microrad.core.units import format_limit, format_quantity
 from microrad.export.linear_part.modes import minimal
 from microrad.export.linear_part.sections import sections
 from microrad.export.records import (
@@ -222,9 +222,10 @@ def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook |
 def _broken(choice: PointingChoice | CoupledChoice) -> str:
     left = choice.left
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
+    times = format_limit(left.times, "", least=True)  # never rounded onto the most
     return (
         f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
-        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {controller_study.PROMISE:g} times "
+        f"hysteresis: {times} times the {said} of linear theory, where {controller_study.PROMISE:g} times "
         "is the most. Choose another controller by the simulated figures of microrad design, or write this one all "
         "the same with --accept."
     )

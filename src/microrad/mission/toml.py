@@ -297,7 +297,7 @@ class Document:
         return document
 
     def fault(self, key: str, value: str, reason: str, expected: str, *, line: int = 0, nearest: str = "") -> None:
-        """Note a fault on the line of its key, or of the nearest table above it.
+        """Note a fault on the line of its key, or of the nearest table above it, or else of the first one below it.
 
         Args:
             key: Full dotted key at fault.
@@ -313,6 +313,8 @@ class Document:
             given = value[1:-1] if nearest.startswith('"') else key.rpartition(".")[2]
             reason += _apart(given, nearest)
         found = holder.statement(key)
+        if found is None:  # a table that only has others inside it
+            found = next((each for name, each in holder.statements.items() if name.startswith(f"{key}.")), None)
         line = line or (found.line if found else 0)
         if len(holder.faults) < _MAX_FAULTS:
             file = clipped(str(holder.path))

@@ -7,6 +7,8 @@ from microrad.core import units
 from microrad.core.units import format_beyond, format_quantity
 from microrad.link.radial_error import SMALLEST_PROBABILITY
 
+counted = units.counted
+
 MINUS = "\u2212"
 """The sign in front of a negative number, which is no hyphen."""
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -152,16 +154,6 @@ def duration(time_s: float) -> str:
         if abs(time_s) >= 2.0 * unit_s:
             return f"{plain(time_s / unit_s)} {unit}"
     return f"{plain(time_s)} s"
-
-
-def counted(number: int, noun: str) -> str:
-    """A number with its noun: "1 parameter", "2 parameters".
-
-    Args:
-        number: how many.
-        noun: in the singular.
-    """
-    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def are(number: int) -> str:

@@ -11,6 +11,7 @@ from microrad.campaign.definition.keys import MIRROR, put
 from microrad.campaign.definition.records import Cell
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, text_of
 from microrad.link import LinkError
+from microrad.mission.fields import Quantity, Several
 from microrad.mission.file import LinkFile, either_file, with_values
 from microrad.mission.model import Source
 from microrad.mission.toml import Document, MissionError
@@ -65,8 +66,11 @@ class CellReader:
             raise self.reader.fault(at, values, "is not a list with something in it", expected)
         fitting = [v for v in values if (self.reader.fits(at, found, v) if found else self._is_path(at, v))]
         texts = [text_of(v) for v in fitting]
-        for text in dict.fromkeys(t for t in texts if texts.count(t) > 1):
-            self.reader.fault(at, text, "stands twice", "each value once")
+        read = [_read(found.rule if found else None, v) for v in fitting]
+        firsts = [read.index(value) for value in read]
+        for text, first in {texts[i]: texts[first] for i, first in enumerate(firsts) if first < i}.items():
+            reason = "stands twice" if text == first else f"stands twice, before as {first}"
+            self.reader.fault(at, text, reason, "each value once")
         return fitting
 
     def cells(self, data: Mapping[str, Any], axes: Mapping[str, list[Any]]) -> tuple[Cell, ...]:
@@ -130,6 +134,13 @@ class CellReader:
                 self.reader.fault(f"{name}.{fault.key}", value, f"{fault.reason}{where}", fault.expected, fault.nearest)
             else:
                 self.reader.document.faults.append(replace(fault, reason=f"{fault.reason}{where}"))
+
+
+def _read(rule: Quantity | Several | None, value: object) -> object:
+    """A value by its rule; as its text without one, and where it is the list that stands for one number."""
+    if rule is None or (isinstance(value, list) and not isinstance(rule, Several)):
+        return text_of(value)
+    return rule.read(value)
 
 
 def _with_rate(document: Document, file: LinkFile) -> LinkFile:

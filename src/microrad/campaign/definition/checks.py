@@ -9,7 +9,7 @@ from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
 from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
 from microrad.campaign.records import Limit
-from microrad.core.units import format_input, format_quantity
+from microrad.core.units import counted, format_input, format_quantity
 from microrad.link.fade_series import FadeSeriesError
 from microrad.link.fade_series import of_mission as fading_series
 from microrad.loop import controller_study, coupled_study
@@ -244,7 +244,7 @@ def half_width(reader: ValueReader, table: CampaignTable, keep: Sequence[str]) -
 
 
 def tell_half_width(reader: ValueReader, output: object) -> None:
-    """Say of a precision without half_width, if noted, what would do there, in the unit of its output.
+    """Say of a precision without half_width, if noted, what would do there, in the unit of its output, if it is one.
 
     Args:
         reader: where faults are noted.
@@ -252,7 +252,12 @@ def tell_half_width(reader: ValueReader, output: object) -> None:
     """
     if isinstance(output, str) and (output in OUTPUTS or output == RADIUS):
         rule, example = _width_of(output)
-        reader.tell_missing("precision.half_width", f"{rule.wanted}; for example half_width = {example}")
+        wanted = rule.wanted
+    else:
+        wanted, example = "a half width in the unit of the output", '"0.05 dB"'
+    told = reader.tell_missing("precision.half_width", f"{wanted}; for example half_width = {example}")
+    if told and isinstance(output, str) and output:
+        reader.is_output("precision.output", output, RADIUS)
 
 
 def _width_of(output: str) -> tuple[Quantity, str]:
@@ -322,17 +327,19 @@ def check_minimise(reader: ValueReader, table: CampaignTable) -> None:
     reader.fault("optimise.minimise", wanted, reason, expected, near and f'"{sign}{near}"')
 
 
-def check_size(reader: ValueReader, rows: int, most_rows: int, realisations: int) -> None:
+def check_size(reader: ValueReader, table: CampaignTable, rows: int, most_rows: int, realisations: int) -> None:
     """Runs that the noise streams have numbers for; a first round within the most.
 
     Args:
         reader: where faults are noted.
+        table: the campaign's tables.
         rows: rows of a cell in the first round.
         most_rows: rows of a cell at most.
         realisations: runs of each row.
     """
-    if most_rows < rows:
-        reader.fault("precision.at_most", most_rows, f"is below the {rows} rows of the first round", f"at least {rows}")
+    if table.precision is not None and most_rows < rows:
+        reason = f"is below the {rows} rows of the first round"
+        reader.fault("precision.at_most", table.precision.at_most, reason, f"at least {rows}")
     if most_rows * realisations > MOST_RUNS:
-        reason = f"makes {most_rows} rows of {realisations} runs each in a cell"
+        reason = f"makes {most_rows} rows of {counted(realisations, 'run')} each in a cell"
         reader.fault("runs", None, reason, f"at most 2^32 = {MOST_RUNS} runs: fewer rows or realisations")

@@ -196,7 +196,7 @@ class _DefinitionReader:
         most = rows if table.precision is None else _whole_blocks(table.precision.at_most, block, table.sampling)
         loop_varies = table.loop is not None and bool(varying)
         realisations = table.realisations or (LANES if loop_varies else 1)
-        checks.check_size(self.reader, rows, most, realisations)
+        checks.check_size(self.reader, table, rows, most, realisations)
         checks.check_repeats(self.reader, table, bool(self.inputs), rows, most)
         files = self._files(mission, cells, draws)
         if not self.document.faults:  # each named file is there

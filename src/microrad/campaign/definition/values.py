@@ -129,16 +129,18 @@ class ValueReader:
             name = at.rpartition(".")[2]
             raise self.fault(at, raw, error.reason, f"{error.expected}; for example {name} = {example}") from None
 
-    def tell_missing(self, key: str, expected: str) -> None:
-        """Say of a key that was noted as missing what would do in its place.
+    def tell_missing(self, key: str, expected: str) -> bool:
+        """Say of a key that was noted as missing what would do in its place; whether one was.
 
         Args:
             key: the key in the campaign file.
             expected: what would do.
         """
-        for i, fault in enumerate(self.document.faults):
-            if fault.key == key and fault.reason == "is missing":
-                self.document.faults[i] = replace(fault, expected=expected)
+        faults = self.document.faults
+        missing = [i for i, fault in enumerate(faults) if fault.key == key and fault.reason == "is missing"]
+        for i in missing:
+            faults[i] = replace(faults[i], expected=expected)
+        return bool(missing)
 
     def is_output(self, at: str, name: object, *others: str) -> bool:
         """Whether a name is that of an output; what is wrong with it is noted.

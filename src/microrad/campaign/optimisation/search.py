@@ -28,6 +28,7 @@ from microrad.campaign.optimisation.candidates import Candidate, Problem, judged
 from microrad.campaign.records import CampaignError
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
+from microrad.core.units import counted
 from microrad.loop import control
 
 Evaluate = Callable[[Floats], dict[str, Floats]]
@@ -336,6 +337,6 @@ def _check(problem: Problem) -> None:
     least = 8 * (len(problem.variables) + 1)
     if problem.evaluations < least:
         raise CampaignError(
-            f"optimise.evaluations: {problem.evaluations} are too few for {len(problem.variables)} variables; "
-            f"give at least {least}"
+            f"optimise.evaluations: {problem.evaluations} are too few for "
+            f"{counted(len(problem.variables), 'variable')}; give at least {least}"
         )

@@ -12,7 +12,7 @@ from microrad.campaign.records import CellSummary, Chunk, Interval, Limit, Tail,
 from microrad.campaign.statistics import tails
 from microrad.campaign.statistics.intervals import moments, ordered, output_summary, quantile_interval, share_interval
 from microrad.core.arrays import Floats
-from microrad.core.units import format_quantity
+from microrad.core.units import format_quantity, plain
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 
 CONFIDENCE = 0.95
@@ -20,6 +20,7 @@ CONFIDENCE = 0.95
 QUANTILES = (0.001, 0.003, 0.01, 0.05, 0.5, 0.95, 0.99, 0.997, 0.999)
 TAIL_CONFIDENCE = 0.99
 TAIL_SHARES = (0.1, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)
+_GIVEN = 15  # digits of a share as the file has it
 
 
 class CellRows:
@@ -144,9 +145,10 @@ class CellRows:
         )
         where = "".join(f" with {key} = {text}" for key, text in self.cell.values.items())
         enough = "as precise" if self._is_enough(found) else "NOT as precise"
+        quantile, confidence = (f"{plain(100.0 * x, _GIVEN)} %" for x in (wanted.quantile, wanted.confidence))
         return (
-            f"{100 * wanted.quantile:g} % quantile of {wanted.output}{where}: {value}, {low} to {high} at "
-            f"{100 * wanted.confidence:g} % confidence; {enough} as asked for (± {half})."
+            f"{quantile} quantile of {wanted.output}{where}: {value}, {low} to {high} at {confidence} confidence; "
+            f"{enough} as asked for (± {half})."
         )
 
 

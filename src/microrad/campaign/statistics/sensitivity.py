@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from microrad.campaign.records import Interval, Sensitivity
 from microrad.core.arrays import Floats
 from microrad.core.intervals import student
+from microrad.core.units import format_limit
 
 MOST_ROWS = 20_000
 SURROGATE_ROWS = 4_096
@@ -189,14 +190,9 @@ def _totals(columns: dict[str, Floats], y: Floats, confidence: float) -> tuple[d
     if surrogate.q2 < _AS_GOOD_AS_IT_GETS:
         surrogate = max(surrogate, _fit(_coordinates(x, as_ranks=True), y), key=lambda s: s.q2)
     if surrogate.q2 < SURROGATE_Q2:
-        return (
-            {},
-            surrogate.q2,
-            (
-                f"no total indices: the polynomial surrogate predicts {max(surrogate.q2, 0.0):.0%} of the variance "
-                f"where {SURROGATE_Q2:.0%} are needed"
-            ),
-        )
+        share = format_limit(100.0 * max(surrogate.q2, 0.0), "", 3)  # never rounded up to what is needed
+        reason = f"predicts {share} % of the variance where {100.0 * SURROGATE_Q2:g} % are needed"
+        return {}, surrogate.q2, f"no total indices: the polynomial surrogate {reason}"
     found = {key: Interval(0.0, 0.0, 0.0, confidence) for key in columns}
     found.update(zip(moving, _total_indices(surrogate, y, confidence), strict=True))
     return found, surrogate.q2, ""

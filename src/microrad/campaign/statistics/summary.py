@@ -134,16 +134,17 @@ def _warnings(campaign: CampaignFile, cells: Sequence[CellRows]) -> tuple[str, .
     found = list(campaign.warnings)
     failed, rows = sum(cell.failed for cell in cells), sum(cell.rows for cell in cells)
     if failed:
-        found.append(f"{failed} of {rows} rows have no result; the figures are those of the others.")
+        some = f"{failed} of {rows} rows have no result; the figures are those of the others."
+        found.append("No row has a result: there are no figures." if failed == rows else some)
     chunks = [chunk.columns for cell in cells for chunk in cell.chunks]
     for name, words in _EXTRAPOLATED.items():
         if any(np.any(columns[name] > 0.0) for columns in chunks if name in columns):
             found.append(words)
-    if any(draw.drawn_as is not None for draw in campaign.draws):
-        worth = min((cell.worth for cell in cells if cell.rows > cell.failed), default=math.nan)
+    known = [cell for cell in cells if cell.rows > cell.failed]
+    if known and any(draw.drawn_as is not None for draw in campaign.draws):
         found.append(
             "Some inputs are drawn from another distribution than their own and weighted back: for a mean the rows are "
-            f"worth {plain(worth)} equal ones."
+            f"worth {plain(min(cell.worth for cell in known))} equal ones."
         )
     return tuple(found)
 

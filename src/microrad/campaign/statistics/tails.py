@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.campaign.records import Interval, Tail
+from microrad.core import units
 from microrad.core.arrays import Floats
 from microrad.core.intervals import binomial_band, counted
 
@@ -57,7 +58,7 @@ def tail_of_time(
         high=band.high[seen],
         wanted=wanted,
         confidence=confidence,
-        method=f"share of the time of {rows} rows, which are independent",
+        method=f"share of the time of {units.counted(rows, 'row')}{', which are independent' * (rows > 1)}",
         effective_runs=_effective(band, wanted),
     )
 
@@ -106,7 +107,7 @@ def tail_weighted(
         high=band.high[shown],
         wanted=wanted,
         confidence=confidence,
-        method=f"importance sampling of the noise in {draws} runs",
+        method=f"importance sampling of the noise in {units.counted(draws, 'run')}",
         effective_runs=_effective(whole, wanted),
         beyond={error: _beyond(radius, band, error, confidence) for error in errors_rad},
         variance={error: _variance(weight[radius > error], draws) for error in errors_rad},

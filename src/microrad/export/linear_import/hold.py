@@ -11,6 +11,7 @@ import numpy as np
 
 from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import counted
 from microrad.export.linear_import.roots import COINCIDING, Roots, response
 from microrad.export.matrices.forms import polynomials, roots
 from microrad.export.matrices.structure import pole_text
@@ -55,8 +56,9 @@ def without_hold(of: Roots, source: str) -> Roots:
 def _refuse_without_inverse(of: Roots, source: str) -> None:
     if of.zeros.size >= of.poles.size:
         raise ExportError(
-            f"{source}: {of.zeros.size} zeros over {of.poles.size} poles, its output follows the drive within a "
-            "sample, and that of a mirror behind a hold does not (D = 0); read the output ahead of the drive"
+            f"{source}: {counted(of.zeros.size, 'zero')} over {counted(of.poles.size, 'pole')}, its output follows the "
+            "drive within a sample, and that of a mirror behind a hold does not (D = 0); read the output ahead of the "
+            "drive"
         )
     for number, pole in enumerate(of.poles):
         place = pole_text(pole, of.period_s)

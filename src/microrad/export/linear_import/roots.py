@@ -9,6 +9,7 @@ import numpy as np
 
 from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import counted
 from microrad.export.linear_import.matlab import form_of, numbers
 from microrad.export.matrices.files import python_control
 from microrad.export.matrices.forms import factored, factors, polynomials, roots
@@ -122,9 +123,8 @@ def roots_of_states(system: lti.StateSpace, period_s: float, source: str) -> Roo
         if getattr(system, key).shape != wanted:
             raise ExportError(f"{source}: {key} has shape {getattr(system, key).shape}, where {wanted} fits the others")
     if (inputs, outputs) != (1, 1):
-        raise ExportError(
-            f"{source}: {inputs} inputs and {outputs} outputs; a mirror file has one drive and one angle: choose"
-        )
+        found = f"{counted(inputs, 'input')} and {counted(outputs, 'output')}"
+        raise ExportError(f"{source}: {found}; a mirror file has one drive and one angle: choose")
     if n > MOST_ORDER:
         raise ExportError(f"{source}: {n} states, and a mirror has at most {MOST_ORDER}; reduce the model (balred)")
     refuse_hidden(system, period_s, source)
@@ -177,7 +177,7 @@ def roots_of_control(system: Any, source: str) -> Roots:
             f"{system.name} has dt = {system.dt}: continuous, or sampled how fast? Give it dt = 0 or its period in s"
         )
     if (system.ninputs, system.noutputs) != (1, 1):
-        found = f"{system.ninputs} inputs and {system.noutputs} outputs"
+        found = f"{counted(system.ninputs, 'input')} and {counted(system.noutputs, 'output')}"
         raise ExportError(f"{source}: {found}; a mirror file has one drive and one angle: choose")
     if isinstance(system, library.StateSpace):
         arrays = {key: getattr(system, key) for key in "ABCD"}
@@ -230,8 +230,8 @@ def checked(of: Roots, source: str) -> Roots:
     """
     if of.zeros.size >= of.poles.size:
         raise ExportError(
-            f"{source}: {of.zeros.size} zeros over {of.poles.size} poles, not strictly proper; a mirror does not "
-            "follow a jump at once: add the pole that ends its band"
+            f"{source}: {counted(of.zeros.size, 'zero')} over {counted(of.poles.size, 'pole')}, not strictly proper; a "
+            "mirror does not follow a jump at once: add the pole that ends its band"
         )
     if not (math.isfinite(of.gain) and of.gain != 0.0):
         raise ExportError(f"{source}: a gain of {of.gain}; the mirror does not move: check the model")

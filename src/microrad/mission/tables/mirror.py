@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from microrad.core.units import format_input, format_limit
+from microrad.core.units import counted, format_input, format_limit
 from microrad.mission.fields import Problem, ProblemsError, Quantity, Several, Table
 
 ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
@@ -104,7 +104,7 @@ class LinearPart(Table):
             sum(2 if abs(d) < 1.0 else 1 for d in each or ()) for each in (self.pole_dampings, self.zero_dampings)
         ]
         if orders[1] >= orders[0]:
-            counts = f"makes {orders[1]} zeros over {orders[0]} poles"
+            counts = f"makes {counted(orders[1], 'zero')} over {counted(orders[0], 'pole')}"
             yield Problem("zeros", counts, "fewer zeros than poles, pairs counted twice")
 
     @property
