@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -223,7 +224,7 @@ def test_a_channel_of_a_text_has_no_length():
         0: "0: u (V)",
         1: "column 1, 0 samples",
         2: "column 2 (V), 5 samples",
-        3: "3: 0, 1 samples",
+        3: "3: 0, 1 sample",
     }
 
 
@@ -234,6 +235,9 @@ def test_a_rate_is_taken_from_the_file_where_it_states_one_alone():
     assert mirror_form.rate_hz(" 200 ") == mirror_form.rate_hz("0.2 kHz") == mirror_form.rate_hz("2e2") == 200.0
     with pytest.raises(SettingError, match=r"^sample rate: .*5 V"):
         mirror_form.rate_hz("5 V")
+    for typed in ("-5", "0", "0 kHz", "-1 Hz"):
+        with pytest.raises(SettingError, match=f"^sample rate: {typed} is not above 0; type a rate such as 5 kHz$"):
+            mirror_form.rate_hz(typed)
 
 
 def test_channels_are_called_as_the_file_calls_them():
@@ -347,6 +351,7 @@ def test_the_reader_s_words_name_the_fields_of_the_form(tmp_path):
         (Setting(0, 1, output_unit="um", lever_arm="5 V"), 'lever arm: "5 V" is in "V"'),
         (Setting(0, 1, output_unit="um", lever_arm="-5 mm"), "lever arm: -5 mm is not above 0"),
         (Setting(0, 1, output_unit="m", lever_arm="0 mm"), "lever arm: 0 mm is not above 0; type a length such as 50"),
+        (Setting(0, 1, "-5"), "sample rate: -5 is not above 0; type a rate such as 5 kHz"),
         (Setting(0, 1, name=" "), "name of the mirror: it has none; type one, such as stage-x"),
         (Setting(0, 1, name="../up"), "'../up.toml' is not taken: its name holds a path; choose another name"),
         (Setting(0, 1, name="there"), "name of the mirror: there.html is there already and is left as it is"),
@@ -1539,3 +1544,22 @@ def test_what_is_asked_of_a_loop_is_taken_or_refused_by_its_field(typed):
     with pytest.raises(control_view.AskError) as refusal:
         control_view.ask_of(*typed, 8000.0)
     assert str(refusal.value) == ASKED[typed]
+
+
+@pytest.mark.parametrize(
+    ("text", "after"),
+    [
+        ('mirror.file = "a.toml"\nname = "x"\n[b]\n', 'mirror.file = "s.toml"\nname = "x"\n[b]\n'),
+        ('name = "x"\nmirror = { file = "a" }\n[b]\n', 'name = "x"\nmirror.file = "s.toml"\n[b]\n'),
+        (
+            'mirror.name = "a"\n# kept\nx = 1\nmirror.play.a = [\n1]\n[b]\nmirror.c = 1\n[mirror.linear]\ny = 1\n',
+            'mirror.file = "s.toml"\n# kept\nx = 1\n[b]\nmirror.c = 1\n',
+        ),
+        ('\ufeffmirror.file = "a"\r\nx = 1', '\ufeffmirror.file = "s.toml"\r\nx = 1'),
+    ],
+)
+def test_a_mirror_in_keys_above_all_tables_makes_room_for_a_file(tmp_path, text, after):
+    draft = with_mirror_file(Draft(text, tmp_path / "m.toml", ()), tmp_path / "s.toml")
+    assert draft.text == after
+    assert tomllib.loads(after.removeprefix("\ufeff"))["mirror"] == {"file": "s.toml"}
+    assert with_mirror_file(draft, tmp_path / "s.toml").text == after

@@ -1366,3 +1366,11 @@ def test_a_figure_that_shows_nothing_says_why_in_its_middle():
 )
 def test_a_picture_is_the_address_of_an_image(svg, address):
     assert plots.address(svg) == f"data:image/svg+xml;base64,{address}"
+
+
+def test_a_confidence_below_all_of_the_time_is_not_told_as_all_of_it(draft):
+    found = pointing_view.view(draft.set("pointing.confidence", "0.9999999").link())
+    names = [shape.get("name", "") for shape in pointing_view.coverage_plot(found)["layout"]["shapes"]]
+    _, _, totals, said, _ = pointing_view.blocks(found)
+    assert any(name.startswith("99.99999 % inside: ") for name in names)
+    assert totals.folded.startswith("Totals at 99.99999 %: ") and " 99.99999 % would take " in said

@@ -900,7 +900,7 @@ def test_a_text_that_cannot_be_saved_says_why_and_what_to_do(draft, tmp_path, pl
         ("[mirror]\na=1\n[b]\n[mirror.x]\nc=[\n1,\n]\n# end\n", [1, 2, 4, 5, 6, 7], {"mirror", "mirror.x", "b"}),
         ("[mirrors]\na=1\n[mirror.x.y]\n# in\nb=1\n", [3, 4, 5], {"mirrors", "mirror", "mirror.x", "mirror.x.y"}),
         ("a = 1\n[[mirror]]\nb=1\n\n# between\n[[mirror]]\n", [2, 3, 4, 5, 6], {"mirror"}),
-        ("mirror = 1\n[x]\nmirror.a = 2\n", [], {"x"}),
+        ("mirror = 1\n[x]\nmirror.a = 2\n", [1], {"x"}),
     ],
 )
 def test_the_lines_of_a_mirror_are_those_of_its_tables(text, mirror, there):

@@ -1,6 +1,7 @@
 """What the studio's pages of the mission, of runs and of comparisons show, without a browser."""
 
 import json
+import math
 import os
 import re
 import tomllib
@@ -218,6 +219,7 @@ def test_progress_in_words():
     assert runs_view.progress_words(Progress(1, 160, "rows")) == "0.6 %, 1 of 160 rows"
     assert runs_view.progress_words(Progress(0, 160, "rows")) == "0 %, 0 of 160 rows"
     assert runs_view.progress_words(Progress(3, 12, "rows", 0.5)) == "25 %, 3 of 12 rows; 0.5 a second, 18 s left"
+    assert runs_view.progress_words(Progress(3, 2, "rows", 1.0)) == "100 %, 3 of 2 rows; 1 a second, 0 s left"
 
 
 @pytest.mark.parametrize(
@@ -731,7 +733,7 @@ def test_a_beam_that_misses_zero_decibels_is_told_with_its_own_numbers(draft, mo
         (0.98765432, "", "0.9877"),
         (622.08e6, "bit/s", "622 Mbit/s"),
         (3.14159e-4, "rad", "314 µrad"),
-        (12345.678, "", "1.235e+04"),
+        (12345.678, "", "12350"),
     ],
 )
 def test_a_number_is_shown_with_its_unit_in_few_digits(value, unit, text):
@@ -745,7 +747,7 @@ def test_the_change_of_a_number_has_its_unit_and_a_sign_in_front():
     )
     assert compare_view.beside(here, there) == [
         ("r", "622 Mbit/s", "1 Gbit/s", "+378 Mbit/s"),
-        ("p", "0.25", "0.125", "-0.125"),
+        ("p", "0.25", "0.125", "−0.125"),
     ]
 
 
@@ -1061,3 +1063,63 @@ def test_how_long_a_job_took_or_takes_is_told_behind_its_start(tmp_path, seconds
     assert runs_view.time_words(job, lambda: now) == words
     ended = replace(job, ended=now.isoformat())
     assert runs_view.time_words(ended, lambda: datetime(2030, 1, 1, tzinfo=UTC)) == words
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "unit", "row"),
+    [
+        (300e6, 300.4e6, "bit/s", ("300 Mbit/s", "300.4 Mbit/s", "+400 kbit/s")),
+        (3.001, 3.004, "dB", ("3.001 dB", "3.004 dB", "+0.003 dB")),
+        (3.004, 3.001, "dB", ("3.004 dB", "3.001 dB", "−0.003 dB")),
+        (0.91234, 0.91233, "", ("0.91234", "0.91233", "−1e-05")),
+        (3e8, 3e8 * (1.0 + 1e-9), "bit/s", ("300 Mbit/s", "300 Mbit/s", "same")),
+        (math.inf, math.inf, "s", ("inf s", "inf s", "same")),
+    ],
+)
+def test_numbers_that_differ_in_a_later_digit_are_told_apart(here, there, unit, row):
+    assert compare_view.beside([Number("n", here, unit)], [Number("n", there, unit)]) == [("n", *row)]
+
+
+def test_what_is_required_stands_behind_a_number_that_is_told_apart():
+    one, other = (Number("n", value, "W", "1 W", True) for value in (2.0001, 2.0002))
+    ((_, *cells, change),) = compare_view.beside([one], [other])
+    assert cells == [Cell("2.0001 W, required 1 W", "PASS"), Cell("2.0002 W, required 1 W", "PASS")]
+    assert change == "+100 µW"
+
+
+def test_a_margin_that_no_rate_has_leaves_the_largest_rate_out(draft):
+    far = compare_view.link_numbers(draft.set("requirement.margin", "90 dB"))
+    rows = {row[0]: row[1:] for row in compare_view.beside(compare_view.link_numbers(draft), far)}
+    assert rows[RATES[1]][1:] == ("none", "") and "nan" not in str(rows)
+
+
+@pytest.mark.parametrize(
+    ("text", "there"),
+    [
+        ('channel.elevation = "30 deg"\n', "channel"),
+        ('\ufeffchannel = { elevation = "30 deg" }\n', "channel"),
+        ('[fine_pointing]\nwheels.speed = "50 Hz"\n', "fine_pointing.wheels"),
+        ('fine_pointing = { rate = "5 kHz" }\n', "fine_pointing.wheels"),
+    ],
+)
+def test_a_table_that_stands_in_keys_is_not_offered_nor_one_within_such_a_table(draft, text, there):
+    found = draft.with_text(text)
+    assert there not in offered(found) and "jitter" in offered(found)
+    with pytest.raises(DraftError, match=r"cannot be added: it is there already"):
+        with_table(found, there)
+
+
+EXAMPLE = '# [channel]\r\n# elevation = "30 deg"\n'
+
+
+@pytest.mark.parametrize(
+    "text", [f"{EXAMPLE}[b]\r\n", f"a = 1\n\r\n{EXAMPLE}", f"\ufeff{EXAMPLE}[b]\n", f"\ufeff{EXAMPLE}"]
+)
+def test_an_example_comes_to_life_and_no_line_end_nor_mark_changes(draft, text):
+    assert with_table(replace(draft, text=text), "channel").text == text.replace("# ", "")
+
+
+def test_an_example_at_the_end_of_lines_of_both_kinds_changes_none_of_them(draft):
+    text = "a = 1\r\nb = 2\n[c]"
+    added = with_table(replace(draft, text=text), "channel").text.removeprefix(f"{text}\r\n\r\n")
+    assert added.startswith("[channel]\r\n") and added.count("\n") == added.count("\r\n") > 1

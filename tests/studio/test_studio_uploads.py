@@ -412,6 +412,12 @@ def test_the_folder_is_made_private_and_no_link(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "open")
     with pytest.raises(UploadError, match="is a link or belongs to somebody else"):
         Uploads(tmp_path / "link")
+    (tmp_path / "file").touch()
+    folder = tmp_path / "file" / "uploads"
+    with pytest.raises(UploadError) as refusal:
+        Uploads(folder)
+    words = f"{folder} cannot be made or made private: Not a directory; choose another working folder"
+    assert str(refusal.value) == words
 
 
 @posix
@@ -712,7 +718,7 @@ def bomb(path, header, megabytes):
 def test_a_zip_bomb_is_refused_by_what_it_states(tmp_path):
     path = bomb(tmp_path / "bomb.npz", npy_header(25_000_000), 200)
     for columns in (None, Columns((0,), (1,), rate_hz=1e3)):
-        assert "'u' states 2.5e+07 samples, and at most 2e+07 are read here; cut out" in refused(path, columns)
+        assert "'u' states 25000000 samples, and at most 20000000 are read here; cut out" in refused(path, columns)
 
 
 def test_a_recording_of_as_many_samples_as_are_read_is_opened(tmp_path):
@@ -722,6 +728,9 @@ def test_a_recording_of_as_many_samples_as_are_read_is_opened(tmp_path):
     assert process.opened(tmp_path / "b.csv", {"limits": {"samples": 1}}).samples() == (None, None)
     with pytest.raises(process.RefusedError, match="'data' states 300 samples, and at most 299 are read here; cut out"):
         process.opened(tmp_path / "a.npy", {"limits": {"samples": 299}})
+    np.save(tmp_path / "c.npy", np.zeros(20_001, np.int8))
+    with pytest.raises(process.RefusedError, match="states 20001 samples, and at most 20000 are read here"):
+        process.opened(tmp_path / "c.npy", {"limits": {"samples": 20_000}})
 
 
 def test_a_thinned_recording_tells_all_of_its_samples(tmp_path):
@@ -1065,7 +1074,7 @@ def test_a_second_channel_that_claims_too_much_is_refused_by_its_name(monkeypatc
     with pytest.raises(process.RefusedError) as refusal:
         process.opened(Path("x.npz"), {"limits": {"samples": 3_000_000}})
     assert str(refusal.value) == (
-        f"x.npz: '{'b' * 200}' states 4.568e+06 samples, and at most 3e+06 are read here; cut out the part that you "
+        f"x.npz: '{'b' * 200}' states 4567890 samples, and at most 3000000 are read here; cut out the part that you "
         "need, or keep every n-th sample."
     )
     assert process.opened(Path("x.npz"), {"limits": {"samples": 4_567_890}}) is source

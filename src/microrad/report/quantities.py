@@ -138,7 +138,7 @@ def percent(share: float, digits: int = 2) -> str:
 
 def share_of_time(quantile: float) -> str:
     """A quantile as it was asked for: "99.7 %"."""
-    return f"{100.0 * quantile:.6g} %"
+    return f"{100.0 * quantile:.15g} %"
 
 
 def volume(bit: float) -> str:

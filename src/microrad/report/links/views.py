@@ -23,7 +23,7 @@ from microrad.report.links.lines import LINES, line_names, lines_table
 from microrad.report.links.standard import standard_view
 from microrad.report.marks import marked
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import given_angle, minus, percent, power_text, quantity
+from microrad.report.quantities import given_angle, minus, percent, power_text, quantity, share_of_time
 from microrad.report.requirements import derived_words, requirement_table
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verdict, View, opened, told
@@ -115,7 +115,7 @@ def pointing_view(p: OpenLoopPointing | None) -> View | None:
             for s in p.summations
         ],
         (0, *range(2, 6 + len(beside))),
-        folded=f"Totals at {100 * p.confidence:g} %: {sums}",
+        folded=f"Totals at {share_of_time(p.confidence)}: {sums}",
         names={1: "pointing.totals.x.total_rad"},
     )
     note = (
@@ -150,8 +150,8 @@ def coverage(p: OpenLoopPointing) -> list[str]:
     return [
         f"Read as {own.convention}, the beacon's half angle is {format_quantity(own.half_angle_rad, 'rad', 3)}, "
         f"{'at least' if own.covers else 'less than'} the root sum square of one axis. It covers the partner with a "
-        f"probability of {own.coverage:.4f}; both axes and their biases are counted. {100 * p.confidence:g} % would "
-        f"take a divergence of {needed}. Read as {other.convention}, the half angle is "
+        f"probability of {own.coverage:.4f}; both axes and their biases are counted. {share_of_time(p.confidence)} "
+        f"would take a divergence of {needed}. Read as {other.convention}, the half angle is "
         f"{format_quantity(other.half_angle_rad, 'rad', 3)} and the probability {other.coverage:.4f}."
     ]
 

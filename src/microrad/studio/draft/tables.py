@@ -24,9 +24,10 @@ _RULE = re.compile(r"#[ \t]*-{20,}.*")
 
 def offered(draft: Draft) -> tuple[str, ...]:
     """Names of the tables that the draft could get, in the order of the shipped mission."""
-    there = _tables(draft.text)
-    names = dict.fromkeys((*_commented(draft.text), *_examples()))
-    return tuple(name for name in names if name not in there and _has_home(name, there))
+    text = draft.text.removeprefix("\ufeff")
+    there, taken = _tables(text), _tables(text, ("table", "tables", "key"))
+    names = dict.fromkeys((*_commented(text), *_examples()))
+    return tuple(name for name in names if name not in taken and _has_home(name, there))
 
 
 def with_table(draft: Draft, name: str) -> Draft:
@@ -40,10 +41,10 @@ def with_table(draft: Draft, name: str) -> Draft:
     """
     if name not in offered(draft):
         raise DraftError(f"[{name}] cannot be added: it is there already, or a mission has no such table")
-    text = draft.text.replace("\r\n", "\n")
+    text = draft.text.removeprefix("\ufeff")
     revived = _revived(text, name)
     if revived is None:
-        revived = f"{text.rstrip()}\n\n{_examples()[name]}\n"
+        revived = text.rstrip() + f"\n\n{_examples()[name]}\n".replace("\n", _line_end(text))
     return draft.with_text(revived)
 
 
@@ -53,9 +54,9 @@ def _has_home(name: str, there: set[str]) -> bool:
     return not outer or outer[0] in there
 
 
-def _tables(text: str) -> set[str]:
-    """Tables of a text, those with a line of their own and those that dotted names imply."""
-    found = {each.key for each in scan(text.replace("\r\n", "\n")) if each.kind in ("table", "tables")}
+def _tables(text: str, kinds: tuple[str, ...] = ("table", "tables")) -> set[str]:
+    """Tables of a text by statements of these kinds: those that these name, and those that dotted names imply."""
+    found = {each.key for each in scan(text.replace("\r\n", "\n")) if each.kind in kinds}
     return found | {name.rsplit(".", n)[0] for name in found for n in range(1, name.count(".") + 1)}
 
 
@@ -146,27 +147,35 @@ def _of_an_example(line: str) -> bool:
 def with_mirror_file(draft: Draft, mirror: Path) -> Draft:
     """The draft with the mirror of a file in place of its own: tables `[mirror]` and `[mirror.…]` make room for it.
 
-    The comments between the tables stay where they are, and so does everything else. The path is written as seen from
-    the mission's file. Raises `DraftError` for a path that no file of text can hold.
+    The comments between the tables stay where they are, and so does everything else; a mirror that stands in keys
+    above all tables is named by such a key. The path is written as seen from the mission's file. Raises `DraftError`
+    for a path that no file of text can hold.
 
     Args:
         draft: the mission.
         mirror: the path of the mirror's file.
     """
     lines = _LINE.findall(draft.text.removeprefix("\ufeff"))
-    end = "\r\n" if any(line.endswith("\r\n") for line in lines) else "\n"
+    end = _line_end(draft.text)
     seen_from_there = Path(os.path.relpath(mirror.absolute(), draft.path.absolute().parent)).as_posix()
-    new = f"[mirror]{end}file = {json.dumps(seen_from_there, ensure_ascii=False)}{end}"
     gone = _lines_of_mirror("".join(lines).replace("\r\n", "\n"))
+    first = min(gone, default=0)
+    by_key = gone and not lines[first - 1].lstrip().startswith("[")  # other keys may follow
+    file = f"file = {json.dumps(seen_from_there, ensure_ascii=False)}{end}"
+    new = f"mirror.{file}" if by_key else f"[mirror]{end}{file}"
     kept: list[str] = []
     for number, line in enumerate(lines, start=1):
-        if number == min(gone, default=0):
+        if number == first:
             kept.append(new)
         if number not in gone:
             kept.append(line)
     if not gone:
         kept.append(f"{'' if not lines or lines[-1].endswith(end) else end}{end}{new}")
     return draft.with_text("".join(kept))
+
+
+def _line_end(text: str) -> str:
+    return "\r\n" if "\r\n" in text else "\n"
 
 
 def _lines_of_mirror(text: str) -> set[int]:
@@ -176,13 +185,13 @@ def _lines_of_mirror(text: str) -> set[int]:
     inside, last = False, 0
     for each in statements:
         header = each.kind in _HEADERS
-        mine = _of_mirror(each) if header else inside
+        mine = _of_mirror(each) or (inside and not header)
         if mine:
             found |= set(range(last + 1 if inside else each.line, each.last_line + 1))
             last = each.last_line
-        inside = mine
+        inside = mine and (header or inside)
     return found
 
 
-def _of_mirror(header: Statement) -> bool:
-    return header.key == "mirror" or header.key.startswith("mirror.")
+def _of_mirror(each: Statement) -> bool:
+    return each.key == "mirror" or each.key.startswith("mirror.")

@@ -103,7 +103,7 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
     for name, samples in zip(source.names, source.samples(), strict=True):
         if samples is not None and samples > most:
             raise RefusedError(
-                f"{path}: '{name[:_TEXT]}' states {samples:.4g} samples, and at most {most:.4g} are read here; cut out "
+                f"{path}: '{name[:_TEXT]}' states {samples} samples, and at most {most} are read here; cut out "
                 "the part that you need, or keep every n-th sample."
             )
     return source

@@ -209,4 +209,5 @@ def _private(folder: Path) -> Path:
     try:
         return plain_files.private(folder)
     except OSError as error:
-        raise UploadError(f"{folder}: {error.strerror}, or choose another working folder") from error
+        where = f"{folder} cannot be made or made private: {error.strerror}"
+        raise UploadError(f"{where}; choose another working folder") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from microrad.core.folder import MANIFEST, read_bytes
 from microrad.core.units import UnitError, parse_quantity
 from microrad.link import study as link_study
 from microrad.mission.toml import value_of
-from microrad.report.quantities import quantity
+from microrad.report.quantities import MINUS, apart, plain, quantity
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Soft, Verdict, View, told
 from microrad.studio.draft.draft import Draft, Value
@@ -39,7 +40,7 @@ class Number:
     @property
     def text(self) -> str:
         """The value with its unit."""
-        return quantity(self.value, self.unit) if self.unit else f"{self.value:.4g}"
+        return quantity(self.value, self.unit) if self.unit else plain(self.value, 4)
 
 
 def blocks(session: Session, here: Draft, there: Draft, names: tuple[str, str]) -> tuple[View, ...]:
@@ -99,20 +100,27 @@ def beside(ours: Sequence[Number], theirs: Sequence[Number]) -> list[tuple[str |
     """
     first, second = {n.name: n for n in ours}, {n.name: n for n in theirs}
     pairs = {name: (first.get(name), second.get(name)) for name in (*first, *second)}
-    return [(name, _cell(a), _cell(b), _change(a, b)) for name, (a, b) in pairs.items()]
+    return [(name, *_row(a, b)) for name, (a, b) in pairs.items()]
 
 
-def _cell(number: Number | None) -> str | Cell:
-    if number is None or number.met is None:
-        return "none" if number is None else number.text
-    return Cell(f"{number.text}, required {number.required}", "PASS" if number.met else "FAIL")
-
-
-def _change(here: Number | None, there: Number | None) -> str:
+def _row(here: Number | None, there: Number | None) -> tuple[str | Cell, str | Cell, str]:
+    """Both numbers, with as many more digits as it takes to tell them apart, and the change."""
     if here is None or there is None:
-        return ""
-    change = Number("", there.value - here.value, here.unit)
-    return "same" if here.text == there.text else f"{'' if change.value < 0.0 else '+'}{change.text}"
+        return _cell(here), _cell(there), ""
+    texts = (here.text, there.text)
+    if texts[0] == texts[1]:
+        texts = apart(here.value, there.value, here.unit)
+    if texts[0] == texts[1]:
+        return _cell(here), _cell(there), "same"
+    change = there.value - here.value
+    size = Number("", -abs(change), here.unit).text.removeprefix(MINUS)  # small decibels below 0 have their digits
+    return _cell(here, texts[0]), _cell(there, texts[1]), f"{MINUS if change < 0.0 else '+'}{size}"
+
+
+def _cell(number: Number | None, text: str = "") -> str | Cell:
+    if number is None or number.met is None:
+        return "none" if number is None else text or number.text
+    return Cell(f"{text or number.text}, required {number.required}", "PASS" if number.met else "FAIL")
 
 
 def differences(here: Draft, there: Draft) -> list[tuple[str, str, str]]:
@@ -175,7 +183,8 @@ def link_numbers(draft: Draft) -> tuple[Number, ...]:
         found.append(Number(f"{budget.name}: received power", budget.received_power_w, "W"))
     rate = study.file.mission.communication.data_rate_bit_s
     found.append(Number("Data rate", float(rate), "bit/s"))
-    found.append(Number("Largest data rate with the required margin", study.largest_rate_bit_s, "bit/s"))
+    if not math.isnan(study.largest_rate_bit_s):
+        found.append(Number("Largest data rate with the required margin", study.largest_rate_bit_s, "bit/s"))
     if study.open_loop is not None:
         found.append(Number("Open-loop pointing error, root sum square", study.open_loop.rss_rad, "rad"))
     if study.finding is not None:

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from microrad.core.folder import write_whole
 from microrad.core.units import UnitError, parse_quantity
 from microrad.lab.recording import ACCEPTABLE, stated_units
+from microrad.report.quantities import counted
 from microrad.studio.commands import Action, identify
 from microrad.studio.guard import plain_files
 from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
@@ -254,7 +255,7 @@ def labels(listing: Listing) -> dict[int, str]:
 
 def _label(number: int, name: str, unit: str, samples: int | None) -> str:
     told = f" ({unit})" if unit and not name.endswith((f"({unit})", f"[{unit}]")) else ""
-    length = "" if samples is None else f", {samples} samples"
+    length = "" if samples is None else f", {counted(samples, 'sample')}"
     own = f"column {number}" if name in ("", str(number)) else f"{number}: {name}"
     return f"{own}{told}{length}"
 
@@ -268,9 +269,12 @@ def rate_hz(typed: str) -> float | None:
         float(text)
         text = f"{text} Hz"
     try:
-        return parse_quantity(text, "Hz")
+        found = parse_quantity(text, "Hz")
     except UnitError as error:
         raise SettingError(f"sample rate: {error}") from None
+    if not found > 0.0:
+        raise SettingError(f"sample rate: {typed} is not above 0; type a rate such as 5 kHz")
+    return found
 
 
 def lever_arm_m(setting: Setting) -> float | None:

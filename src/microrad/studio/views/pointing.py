@@ -19,7 +19,7 @@ from microrad.report.links import words
 from microrad.report.marks import marked
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Bars, Line, Mark, Rule, shortened
-from microrad.report.quantities import quantity
+from microrad.report.quantities import quantity, share_of_time
 from microrad.report.view import Block, Soft, View, told
 from microrad.studio.draft.draft import Draft
 from microrad.studio.views.plots import Plot, plot, rows
@@ -125,7 +125,7 @@ def coverage_plot(v: PointingView) -> Plot:
     named = (
         ("root sum square", ORANGE, "--"),
         ("ECSS, two axes", GREEN, "-."),
-        (f"{100.0 * p.confidence:g} % inside", BLACK, ":"),
+        (f"{share_of_time(p.confidence)} inside", BLACK, ":"),
     )
     for total_rad, (name, colour, dash) in zip(totals.values(), named, strict=True):
         marks.append(Rule(total_rad * 1e6, True, colour, dash, 1.5, f"{name}: {quantity(total_rad, 'rad')}"))

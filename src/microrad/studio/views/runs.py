@@ -120,7 +120,7 @@ def progress_words(progress: Progress | None) -> str:
         return "starting"
     words = f"{_percent(progress.share)}, {progress.done} of {progress.total}{_what(progress)}"
     if progress.rate_1_s:
-        left_s = (progress.total - progress.done) / progress.rate_1_s
+        left_s = max(progress.total - progress.done, 0) / progress.rate_1_s
         words += f"; {format_quantity(progress.rate_1_s, 'a second', 3)}, {duration(left_s)} left"
     return words
 
