@@ -10,7 +10,6 @@ import webbrowser
 from email.message import Message
 from http.cookiejar import CookieJar
 from pathlib import Path
-from queue import SimpleQueue
 from types import SimpleNamespace
 from urllib.request import Request
 
@@ -39,6 +38,7 @@ from places import ROOT
 from shipped import SHIPPED
 from studio.test_studio_guard import COOKIE, PORT, TOKEN, Inner, ask, guard
 from studio_jobs import written
+from waiting import until
 
 PAGE = (ROOT / "docs" / "studio.md").read_text(encoding="utf-8")
 SAID = " ".join(PAGE.split())
@@ -274,9 +274,10 @@ def test_a_kill_while_the_key_has_two_names_leaves_the_second_one_once(tmp_path,
 
 
 def test_the_browser_is_opened_where_the_studio_is_open_to_the_network_too(monkeypatch, capsys):
-    opened = SimpleQueue()
+    opened = []
     monkeypatch.setattr(server, "way_in", lambda of, url: f"page of {of} at {url}")
-    monkeypatch.setattr(webbrowser, "open", opened.put)
+    monkeypatch.setattr(webbrowser, "open", opened.append)
     command._ready(SimpleNamespace(studio="it"), server.Entrance(None, ("192.168.1.7:81",), "s"), "192.168.1.7", True)
-    assert opened.get(timeout=60.0) == "page of it at http://192.168.1.7:81/?token=s"
+    until(lambda: opened, "the browser")
+    assert opened == ["page of it at http://192.168.1.7:81/?token=s"]
     assert "open to the network on 192.168.1.7" in capsys.readouterr().err
