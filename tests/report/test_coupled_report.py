@@ -703,7 +703,7 @@ def test_the_error_is_told_at_up_to_four_amplitudes_then_at_three():
 @pytest.mark.parametrize(
     ("held", "fitted", "said"),
     [
-        (1, 1, "This rests on r0; 1 other record were fitted."),
+        (1, 1, "This rests on r0; 1 other record was fitted."),
         (2, 2, "This rests on r0 and r1; 2 other records were fitted."),
         (4, 2, "This rests on r0, r1, r2 and r3; 2 other records were fitted."),
         (5, 2, "This rests on r0, r1, r2, r3 and 1 more; 2 other records were fitted."),
@@ -1100,3 +1100,25 @@ def test_a_terminal_has_both_files_at_its_end_and_only_those_that_there_are():
         "b.html written: what was found, with pictures.",
         "a.toml written (hysteretic stiffness, order 3).",
     ]
+
+
+def test_a_gain_that_more_than_doubles_has_no_power_of_ten():
+    of = AmplitudeDependence(
+        np.array([0.25, 2.0]), np.array([2e-6, 5e-6]), np.array([80.0, 1314.0]), np.array([0.5, 0.25]), np.full(2, 0.1)
+    )
+    said, *_ = coupled_page._dependence(found_of(dependence=of), {}).blocks
+    assert said.endswith("the gain changes by +150 % and the main resonance by +1.23 kHz.")
+
+
+def test_a_figure_of_some_amplitudes_says_which_are_drawn():
+    for count, some in ((MOST, False), (MOST + 1, True)):
+        found = at_amplitudes(count)
+        own = replace(found.candidate(), band_error_rms=np.ones((count, 2, 2)))
+        caption = bands(replace(found, candidates=(own,))).caption
+        assert (f" Of {count} rms drives the first, the middle and the last are drawn." in caption) is some
+
+
+def test_one_drive_of_many_outputs_is_told_in_the_singular():
+    model = SimpleNamespace(outputs=[None] * (MOST + 2), actuators=[None])
+    said = coupled_figures_module._left_out(SimpleNamespace(candidate=lambda: SimpleNamespace(model=model)))
+    assert said == f" Of {MOST + 2} outputs and 1 drive the first {MOST} are drawn."

@@ -786,8 +786,10 @@ def test_correlated_parameters_are_told_from_the_least_on_the_strongest_first(mo
     assert parameters.correlations(joint(matrix)) == [("p2", "p0", -0.99), ("p1", "p0", parameters.HIGH_CORRELATION)]
     end = "Condition number 12; the variances are inflated 2 times for the colour of the residual."
     assert parameters.notes(joint(np.eye(3))) == ["One start.", end]
-    for count, more in ((4, ""), (5, " and 4 pairs more")):  # six pairs, ten pairs
-        _, said, last = parameters.notes(joint(np.full((count, count), 0.999)))
+    for count, least, more in ((4, 0, ""), (5, 0, " and 4 pairs more"), (5, 3, " and 1 pair more")):  # six, ten, seven
+        matrix = np.full((count, count), 0.999)
+        matrix[4:, :least] = 0.0
+        _, said, last = parameters.notes(joint(matrix))
         assert said.endswith(f"+0.999{more}.") and said.count(" and p") == 6
         assert last == end
 
@@ -809,6 +811,7 @@ def shown_of(drive, sine=None, role="loops"):
         ("broadband", (10.0, 20.0), 40.0, 1, ""),
         ("broadband", None, 40.0, 0, "40 Hz"),
         ("loops", (10.0, 20.0), 40.0, 0, "40 Hz"),
+        ("loops", (10.0, 20.0), 12345.0, 0, "12.35 kHz"),
         ("loops", (10.0, 20.0), None, 0, ""),
     ],
 )
@@ -1614,9 +1617,35 @@ def test_a_page_without_warnings_refusals_findings_or_pictures_says_so(monkeypat
     [
         (3.0 + 2.0 * np.sin(2 * np.pi * np.arange(64) / 16.0), 1.0, 1600.0, "100 Hz, ± 2 V about 3 V"),
         (3.0 + 2.0 * np.sin(2 * np.pi * np.arange(64) / 16.0), 10.0, 800.0, "50 Hz, ± 20 V about 30 V"),
+        (2.0 * np.sin(2 * np.pi * np.arange(64) / 16.0) - 5.0, 1.0, 1600.0, "100 Hz, ± 2 V about −5 V"),
+        (1e3 * np.sin(2 * np.pi * np.arange(64) / 16.0), 1.0, 1600.0, "100 Hz, ± 1000 V about 0 V"),
         (np.arange(32.0) ** 3 % 17, 0.001, 8.0, "many frequencies, ± 0.008 V about 0.008 V"),
         (np.zeros(16), 1.0, 8.0, "many frequencies, ± 0 V about 0 V"),
     ],
 )
 def test_a_drive_is_told_in_volts_whatever_unit_its_file_has(drive, volts, rate_hz, said):
     assert words.drive_text(ns(drive=drive[:, None], rate_hz=rate_hz), volts) == said
+
+
+def test_numbers_of_an_identification_have_minus_signs_and_no_powers_of_ten():
+    found = ns(drive_min_v=-6.0, drive_max_v=6.0)
+    assert words.drive_range(found) == ("−6 V", "6 V")
+    assert identification_page._angle(1.234e-3) == "1230 µrad"
+    order = ns(order=2, parameters=5, chi_square=123456.0, freedom=1, criterion=-123456.7, output_error_rms=1.23456e-2)
+    (row,) = identification_page._scan(ns(scan=[order], order=2)).rows
+    assert row == ("2", "5", "123500", "−123460", "12350 µrad", "chosen")
+
+
+def test_a_settled_hysteresis_with_a_large_error_has_no_power_of_ten():
+    fit = made(
+        BoucWenFit,
+        model=BoucWen(1e-3, 2e-6, 3e-2, 4e-5, 5.0, 1.5, rate_limit_v_s=700.0),
+        covariance=4.0 * np.diag([1e-10, 4e-14, 9e-12, 1e-12, 1e-2, 4e-4]),
+        not_identified=(),
+        agreeing_starts=3,
+        start_rms_percent=(1.0, 2.0, 3.0, 4.0),
+        condition_number=450.0,
+        colour_inflation=1.75,
+    )
+    *_, said, _ = parameters.notes(fit)
+    assert said.endswith("= 4620 ± 140 µrad.")

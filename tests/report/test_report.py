@@ -1421,3 +1421,10 @@ def test_a_page_has_its_scripts_before_its_last_end_and_the_drawing_library_wher
     library = scripts.library() if inside == scripts.MARK else ""
     assert made == f"<body>{inside}{scripts.keyboard()}{library}</body></html>"
     assert scripts.keyboard().count("<script>") == 1 and scripts.library().count("<script>") == 2
+
+
+def test_the_bandwidth_of_the_fine_loop_stands_in_the_chain_without_a_power_of_ten():
+    design = ns(name="LQG", loop_margins=ns(modulus=0.5, bandwidth_hz=1234.0))
+    fine = ns(best=ns(design=design), scene=ns(loop=ns(timing=ns(period_s=1e-4))))
+    lines = chain._loop(chain_study(fine_pointing=fine)).lines
+    assert lines[-2:] == ("LQG at 10 kHz", "modulus 0.50, 1230 Hz wide")

@@ -982,7 +982,14 @@ def a_tail(**changes):
 
 @pytest.mark.parametrize(
     ("probability", "said"),
-    [(1e-3, "0.1 %"), (9.9e-4, "9.9×10⁻⁴"), (0.95, "95.0 %"), (0.89, "89 %"), (1.0 - 1e-12, "100.00000000 %")],
+    [
+        (1e-3, "0.1 %"),
+        (9.9e-4, "9.9×10⁻⁴"),
+        (0.95, "95.0 %"),
+        (0.89, "89 %"),
+        (1.0 - 1e-12, "99.99999999 %"),
+        (-0.1, "\u221210 %"),
+    ],
 )
 def test_a_probability_has_a_power_below_a_thousandth_and_more_digits_from_nine_tenths_on(probability, said):
     assert share(probability) == said
@@ -998,7 +1005,7 @@ def test_a_probability_has_a_power_below_a_thousandth_and_more_digits_from_nine_
         (1e-12, 0.2, "", "outage", "10⁻¹² to 20 %"),
         (9e-13, 0.2, "", "outage", "0 % to 20 %"),
         (0.0, 1e-4, "1", "lost_share", "0 to 10⁻⁴"),
-        (9e-13, math.nan, "", "outage", "at least 0"),
+        (9e-13, math.nan, "", "outage", "at least 0 %"),
         (9e-13, 0.2, "", "mirror.alpha", "9e-13 to 0.2"),
     ],
 )
@@ -1196,7 +1203,14 @@ def test_what_the_tail_knows_is_of_the_least_probability_whose_radius_is_known()
 
 @pytest.mark.parametrize(
     ("count", "said"),
-    [(1e9, "1 billion"), (1e6, "1 million"), (999_000.0, "1000000"), (990_000.0, "990000"), (2.5e9, "2.5 billion")],
+    [
+        (1e9, "1 billion"),
+        (1e6, "1 million"),
+        (999_600.0, "1 million"),
+        (9.96e8, "1 billion"),
+        (990_000.0, "990000"),
+        (2.5e9, "2.5 billion"),
+    ],
 )
 def test_a_large_number_is_spoken_from_a_million_on(count, said):
     assert campaign_words._many(count) == said
@@ -1481,6 +1495,8 @@ def test_a_field_of_a_map_is_dark_below_the_middle_and_its_number_is_white_there
     none, *words = drawing._numbered(np.array([[math.nan]]))
     assert (none.low, none.high) == (0.0, 1.0)
     assert words[0].text == "none"
+    _, large = drawing._numbered(np.array([[-1234.0]]))
+    assert large.text == "\u22121230"
 
 
 @pytest.mark.parametrize(("start", "rest", "cut"), [(3.0, 1.0, False), (3.1, 1.0, True), (5.0, 0.0, False)])
@@ -1506,7 +1522,8 @@ def test_the_page_of_a_grid_without_limits_has_one_table_of_combinations():
         *_, view, detail = campaign_module._grid(replace(summary, limits=limits), summary.cells[0], ())
         assert view.title == "Every combination"
         assert len(view.blocks) == tables
-        assert detail == "Below in detail: mirror = a, the first of those that miss a limit least."
+        which = "of those that miss a limit least" if limits else "with results"
+        assert detail == f"Below in detail: mirror = a, the first {which}."
     (view,) = campaign_module._grid(summary, None, ())
     assert len(view.blocks) == 2
 
@@ -2009,7 +2026,7 @@ def test_all_sentences_of_two_combinations():
         ("The radial error exceeds 3.20 µrad with probability 0.1 % (at least 3.00 µrad at 90 % confidence)."),
         (
             "The radial error is beyond 2.5 µrad with probability 1 % (0.5 % to 2.5 % at 90 % "
-            "confidence). The variance of that estimate is 4e-08, that of 2.5e+05 draws "
+            "confidence). The variance of that estimate is 4e-08, that of 250000 draws "
             "without importance sampling."
         ),
         "No radial error beyond 6 µrad was seen (0 % to 0.4 % at 90 % confidence).",
@@ -2548,7 +2565,7 @@ def test_a_campaign_in_a_terminal_has_each_table_sentence_and_failed_row_in_its_
         "The radial error exceeds 3.20 µrad with probability 0.1 % (at least 3.00 µrad at",
         "90 % confidence).",
         "The radial error is beyond 2.5 µrad with probability 1 % (0.5 % to 2.5 % at 90 %",
-        "confidence). The variance of that estimate is 4e-08, that of 2.5e+05 draws",
+        "confidence). The variance of that estimate is 4e-08, that of 250000 draws",
         "without importance sampling.",
         "No radial error beyond 6 µrad was seen (0 % to 0.4 % at 90 % confidence).",
         "Failed rows",
@@ -2604,7 +2621,7 @@ def test_a_worst_row_of_one_axis_begins_where_its_trace_does_and_has_four_drives
         (4e9, "bit", "", "500 MB", "500 MB"),
         (180.0, "s", "", "3.00 min", "3 min"),
         (-4e-6, "rad", "", "−4.00 µrad", "−4 µrad"),
-        (1234567.0, "1", "", "1.235e+06", "1.235e+06"),
+        (1234567.0, "1", "", "1235000", "1235000"),
     ],
 )
 def test_an_estimate_has_three_digits_and_a_bound_those_it_was_given(number, unit, name, estimate, given):
@@ -2800,3 +2817,48 @@ def test_the_tail_between_two_radii_is_read_in_its_logarithm_and_beyond_the_last
     assert (None if found is None else [found.value, found.low, found.high, found.confidence]) == (
         None if ends is None else pytest.approx([*ends, 0.9])
     )
+
+
+@pytest.mark.parametrize(
+    ("missed", "said"),
+    [
+        ((0.0, None, None), "In the only combination with results 100 % of the rows keep both limits."),
+        ((0.25, 0.25, None), "In each of 2 combinations with results 75 % of the rows keep both limits."),
+        ((0.25, 0.25), "In each of 2 combinations 75 % of the rows keep both limits."),
+        (
+            (0.0, 0.25, None),
+            "Of 2 combinations with results, m = 0 keeps both limits most often, in 100 % (0 % to 100 %) of its rows; "
+            "m = 1 least often, in 75 % (68.8 % to 87.5 %) (intervals at 90 %).",
+        ),
+    ],
+)
+def test_only_combinations_with_results_are_counted_among_those_that_keep_the_limits(missed, said):
+    cells = [
+        a_cell({"m": str(k)}, rows=20, failed=0 if each is not None else 20, missed=each or 0.0)
+        for k, each in enumerate(missed)
+    ]
+    cells = [replace(cell, missed=Interval(0.0, 0.0, 1.0, 0.9)) if cell.missed.value == 0.0 else cell for cell in cells]
+    summary = a_campaign(cells)
+    assert campaign_words._said(summary, campaign_words.best(summary)) == said
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (20, "20 rows with results; whether they keep both limits is not known."),
+        (1, "1 row with results; whether it keeps both limits is not known."),
+    ],
+)
+def test_limits_of_outputs_that_no_row_knows_are_not_told_as_none(rows, said):
+    cell = replace(a_cell(rows=rows, failed=0), missed=UNKNOWN)
+    assert campaign_words._said(a_campaign([cell]), cell) == said
+
+
+def test_one_thing_of_a_campaign_is_told_in_the_singular():
+    failed = a_campaign([a_cell(rows=20, failed=11)])
+    assert campaign_tables.more_failed(failed, 10) == "1 more failed row is in the export."
+    assert "\n1 candidate, 1 of" in optimum_report.optimum_text(an_optimum(evaluations=1, refused=1))
+    first = {f"key_{k}": between_ends(0.5 / (k + 1)) for k in range(drawing.MOST_INPUTS + 1)}
+    each = Sensitivity("margin", 40, first, {}, {}, 0.9, "")
+    (figure,) = drawing.sensitivity(a_campaign([a_cell()], sensitivities=(each,)))
+    assert figure.caption.endswith(" 1 input with smaller indices is in the table only.")

@@ -518,7 +518,7 @@ STATIONS = SimpleNamespace(stations={"kiruna": 1, "tromso": 2})
                 "ratio": 1000.0,
             },
             "In 24 h the relay grants the link 3 times, 90 min in all, and could carry 1 TB. The ground (kiruna, "
-            "tromso) is in view once, 10 min in all, and could carry 1 GB; the relay could carry 1e+03 times as much.",
+            "tromso) is in view once, 10 min in all, and could carry 1 GB; the relay could carry 1000 times as much.",
         ),
         (
             {"operations": None, "direct": a_way(contacts=(), capacity_bit=0.0), "ratio": math.inf},
@@ -569,6 +569,8 @@ def test_the_headline_of_two_days_has_each_number_by_the_day_too():
     [
         (0, "never"),
         (1, "once"),
+        (0.9996, "once"),
+        (1.0004, "once"),
         (2, "2 times"),
         (2.345, "2.35 times"),
         (99.95, "100 times"),
@@ -585,7 +587,9 @@ def test_a_time_in_contact_is_in_hours_from_a_thousand_minutes_on(time_s, said):
     assert day_words.contact_time(time_s) == said
 
 
-@pytest.mark.parametrize(("ratio", "said"), [(0.0, ""), (math.inf, ""), (math.nan, ""), (0.5, "0.5")])
+@pytest.mark.parametrize(
+    ("ratio", "said"), [(0.0, ""), (math.inf, ""), (math.nan, ""), (0.5, "0.5"), (12345.0, "12300")]
+)
 def test_two_ways_are_compared_where_both_carry_something(ratio, said):
     told = day_words._compared(a_day(), ratio)
     assert told == (f"; the relay could carry {said} times as much" if said else "")
@@ -657,6 +661,7 @@ def test_the_words_of_the_contacts_name_what_else_cuts_them():
         ([2e6], 2e6, ("a choice",), 0.0, "100 Mbit/s at every range of the contacts."),
         ([1.9e6], 2e6, (), 0.0, "100 Mbit/s up to 1900 km. Beyond that no data flow: the contacts reach 2000 km."),
         ([2e6], 0.0, (), 0.0, "100 Mbit/s up to 2000 km."),
+        ([2e6], 0.0, (), 1.0, "100 Mbit/s up to 2000 km; 100 % of the time is lost in outage."),
         (
             [0.0],
             2e6,
@@ -774,7 +779,7 @@ def test_a_contact_has_its_volume_at_a_single_rate_and_its_losses_where_there_ar
     assert contact_sentences(run_of(), 2, "PI", 1e8) == [f"{begin}{at}{end}{kept}"]
     assert contact_sentences(run_of(), 2, "PI", None) == [f"{begin}{end}{kept}"]
     for count, said in ((1, "once"), (3, "3 times")):
-        lost = f"lock is lost {said} in them, once in 50 s, which the time between them does not show."
+        lost = f"lock is lost {said} in them, once in 50 s, which the rest of the time does not show."
         assert contact_sentences(run_of(losses=count, losses_per_s=0.02), 2, "PI", None) == [f"{begin}{end}{lost}"]
     none = contact_sentences(run_of(data_s=0.0), 2, "PI", 1e8)
     assert none == ["Contact 2 of 10 min never comes to data: given up."]
@@ -1926,3 +1931,35 @@ def test_the_numbers_of_relays_and_stations_are_named_by_what_each_is():
         for place, what in enumerate(("sessions", "with_data_s", "longest_gap_s", "volume_bit"), 1)
     }
     assert partners_table(rich_plan(stations=())) is None
+
+
+def test_one_thing_of_a_day_is_told_in_the_singular():
+    operations = SimpleNamespace(runs=1)
+    assert day_words.sky_words(a_day(sky=sky_of("kiruna"), operations=operations)) == [
+        "The sky over kiruna is clear for 75.0 % of the time (50.0 % in the one drawn sky)."
+    ]
+    for losses, end in ((0, "lock is never lost in it."), (1, "lock is lost once in it, once in 50 s, which the rest")):
+        (said,) = contact_sentences(run_of(windows=range(1), losses=losses, losses_per_s=0.02), 2, "PI", None)
+        assert "The fine loop is simulated in 1 window, 1.5 s in all" in said and end in said
+    one = SimpleNamespace(start_s=np.array([0.0]), end_s=np.array([9e3]))
+    station = SimpleNamespace(**{**vars(rich_plan().by_station), "sessions": np.array([1.0, 0.0])})
+    said = plan_sentences(rich_plan(opportunities=one, planned=range(1), by_station=station))
+    assert "1 contact in reach, 2 h in all, of which 1 session takes 8 h and carries 1.1 TB." in said[0]
+    assert said[3].startswith("1 of the sessions is with ground stations, above their masks, and is expected to carry")
+
+
+def test_shares_and_ratios_of_a_day_have_no_power_of_ten():
+    window = SimpleNamespace(
+        start_s=0.0,
+        range_m=1e6,
+        point_ahead_rad=0.0,
+        rate_rad_s=0.0,
+        rms_rad=0.0,
+        quantile_rad=0.0,
+        largest_rad=0.0,
+        lowest_margin_db=-1.0,
+        share_below=1.0,
+    )
+    run = SimpleNamespace(windows=[window], contact=SimpleNamespace(start_s=0.0))
+    assert windows_table(run, 0.997).rows[0][-1] == "100 %"
+    assert day_words.ratio_text(SimpleNamespace(ratio=12345.0, direct_bit=1.0)) == "12300"

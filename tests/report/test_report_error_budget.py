@@ -820,6 +820,7 @@ LOOP = SimpleNamespace(contribution=SimpleNamespace(kind="loop"))
     ("interpretation", "confidence", "axes", "said"),
     [
         ("temporal", 0.9973, (0, 1), "radial, 99.73 % of the time, on the worst satellite"),
+        ("temporal", 0.99999, (2,), "about z, 99.999 % of the time, on the worst satellite"),
         ("ensemble", 0.5, (0,), "about x, 50 % of the satellites, at their worst time"),
         ("mixed", 0.9995, (1,), "about y, 99.95 % of the satellites and times"),
         ("temporal", 0.68, (2,), "about z, 68 % of the time, on the worst satellite"),
@@ -828,3 +829,7 @@ LOOP = SimpleNamespace(contribution=SimpleNamespace(kind="loop"))
 def test_a_requirement_says_of_what_its_share_is(interpretation, confidence, axes, said):
     required = Requirement(ErrorIndex("RPE", 0.25), confidence, interpretation, axes, None)
     assert budget_words.requirement_text(required) == f"RPE 250 ms, {said}"
+
+
+def test_how_much_larger_a_source_may_be_has_no_power_of_ten():
+    assert budget_words.allowed(SimpleNamespace(allowed=1234.0)) == "1230 times"

@@ -2307,6 +2307,7 @@ power that pointing costs / beyond 20 dB /
     [
         ({"gain": 1234.5, "lead": 0.5}, {"gain": "Hz"}, "gain 1.23 kHz, lead 0.5"),
         ({"shift": -0.25, "time": 2e-3}, {"time": "s", "shift": ""}, "shift −0.25, time 2 ms"),
+        ({"gain": 1234.5}, {}, "gain 1230"),
         ({}, {"a": "s"}, ""),
     ],
 )
@@ -2341,3 +2342,15 @@ def test_an_rms_has_the_decimals_that_its_interval_leaves_it(rms, half, said):
 )
 def test_numbers_at_the_turns_of_their_units_and_with_digits_of_their_own(name, given, text):
     assert getattr(quantities, name)(*given) == text
+
+
+def test_a_bandwidth_of_a_kilohertz_and_more_has_no_power_of_ten(fine):
+    margins = replace(fine.verified[0].design.loop_margins, bandwidth_hz=1234.0, crossover_hz=2344.0)
+    assert section.design_cells("as it is", margins, ())[6:8] == ("1230", "2340")
+
+
+def test_a_worst_case_of_one_draw_and_one_corner_says_so():
+    one = a_worst_case()
+    one.extent.draws, one.corners, one.most_sensitive = 1, 1, one.most_sensitive[:1]
+    said = " ".join(worst_case.worst_case_text(one, 110).split())
+    assert "on 1 mirror drawn from" in said and "on 1 corner of its 1 most sensitive parameter at 2.5" in said

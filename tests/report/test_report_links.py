@@ -119,6 +119,7 @@ def test_the_cells_of_a_case_are_its_record(plain):
     assert links.cells(replace(c, best=wider))[7:9] == ["25.3", "0.46"]
     assert cells[9] == "242"
     assert links.cells(case(plain, data_rate_bit_s=math.nan))[9] == "none"
+    assert links.cells(case(plain, data_rate_bit_s=1e5))[9] == "0.1"
     assert links.cells(case(plain, margin_db=2.0))[4] == "+2.00"
     assert [links.cells(case(plain, uncoded_penalty_db=each))[3] for each in (1.234, math.inf, math.nan)] == [
         "1.23",
@@ -152,8 +153,10 @@ def test_a_line_of_the_pointing_budget_stands_in_every_face_once_the_mission_has
     ("margin_db", "rate_bit_s", "cells"),
     [
         (-3.104, -252.4e6, ["3.10", "252"]),
+        (-3.104, -622e3, ["3.10", "0.622"]),
         (0.2, 3e6, ["\u22120.20", "\u22123"]),  # it can also gain
-        (0.001, 3e5, ["0.00", "0"]),
+        (0.001, 3e5, ["0.00", "−0.3"]),
+        (-0.004, 0.0, ["0.00", "0"]),
         (0.0, 0.0, ["0.00", "0"]),
         (-1.0, math.nan, ["1.00", ""]),
     ],
@@ -1436,6 +1439,16 @@ Rms: radial, about zero. Penalty, the power that the errors cost: with a code th
         (
             [1e-9, math.nan, 0.0],
             ["Fades below the required margin: less than one a year, for Gaussian errors of these spectra."],
+        ),
+        (
+            [2346.0],
+            [
+                (
+                    "Fades below the required margin, for Gaussian errors of that rms and spectrum: c1: 2350 a "
+                    "second of 1 ms each."
+                ),
+                "Warned 1.",
+            ],
         ),
         (
             [2.5, 1e-9, math.nan],

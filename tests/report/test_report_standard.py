@@ -254,3 +254,11 @@ a note
     assert [type(block).__name__ for block in short.blocks] == ["str", "Table"]
     assert list(short.blocks[1].headings) == ["requirement", "number", "asked", "mission has", ""]
     assert list(short.blocks[1].words) == [0, 1, 2, 4]
+
+
+@pytest.mark.parametrize(
+    ("value", "said"), [(1.5296e-6, "1.5296 µm"), (1.5651e-6, "1.5651 µm"), (1.53e-6, "1.53 µm"), (1.5e-6, "1.5 µm")]
+)
+def test_what_misses_a_band_has_the_digits_that_tell_it_from_its_end(value, said):
+    band = compliance.Held(asked("between", (1.53e-6, 1.565e-6), (), "m"), "does not meet", value)
+    assert shown._texts(band) == ("1.53 µm to 1.565 µm", said)

@@ -859,6 +859,8 @@ def test_a_mirror_that_was_measured_elsewhere_is_told_with_its_drives_and_limits
         ("drive", [10.0], []),
         ("drive", [10.005], []),
         ("drive", [20.0, 0.5], ["a drive amplitude of 20 V, 2 times the largest"]),
+        ("drive", [12345.0], ["a drive amplitude of 12.3 kV, 1230 times the largest"]),
+        ("frequency", [2e-4], ["a frequency of 200 µV, 10000 times below the least"]),
         ("frequency", [2.0, 10.0], []),
         ("frequency", [1.9985], []),
         ("frequency", [0.5, 4.0], ["a frequency of 500 mV, 4 times below the least"]),
@@ -1241,6 +1243,8 @@ def test_a_placard_says_how_far_below_the_least_an_input_is():
     end = " at which the links were held against independent methods, 2 m. Figures that depend on it are extrapolated"
     assert said(5.0) == f"a.key = 5 m is 2.5 times the largest{end}"
     assert said(0.5) == f"a.key = 500 mm is below the least, by a factor of 4,{end}"
+    assert said(2468.0) == f"a.key = 2.47 km is 1230 times the largest{end}"
+    assert said(0.001) == f"a.key = 1 mm is below the least, by a factor of 2000,{end}"
     assert said(0.0) == f"a.key = 0 m is below the least{end}"
 
 

@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 from typing import Any
 
-from microrad.core.units import format_quantity, parse_quantity
+from microrad.core.units import format_quantity, parse_quantity, plain
 from microrad.mission.model import Source
 from microrad.report.tables import Table
 from microrad.report.view import Block, Points, Soft, View
@@ -46,9 +46,10 @@ class Placard:
         """Which limit is exceeded, by how much, and what follows."""
         value, limit = (format_quantity(each, self.unit, 3) for each in (self.value, self.limit))
         if self.value > self.limit:
-            how = f"{self.value / self.limit:.3g} times the largest"
+            how = f"{plain(self.value / self.limit)} times the largest"
         else:
-            how = f"below the least, by a factor of {self.limit / self.value:.3g}," if self.value else "below the least"
+            by = f", by a factor of {plain(self.limit / self.value)}," if self.value else ""
+            how = f"below the least{by}"
         part = f"{self.part[0].lower()}{self.part[1:]}"
         return (
             f"{self.key} = {value} is {how} at which {part} were held against independent methods, {limit}. Figures"
@@ -133,9 +134,11 @@ def _past(name: str, values: Sequence[float], extent: Mapping[str, Any]) -> Iter
     """The largest value beyond an extent, and of frequencies the least, each with how far it is beyond."""
     least, most, unit = extent["least"], extent["most"], extent["unit"]
     if values and max(values) > most * (1.0 + 1e-3):
-        yield f"{_WORKS[name]} {format_quantity(max(values), unit, 3)}, {max(values) / most:.3g} times the largest"
+        far = plain(max(values) / most)
+        yield f"{_WORKS[name]} {format_quantity(max(values), unit, 3)}, {far} times the largest"
     if values and name == "frequency" and min(values) < least * (1.0 - 1e-3):
-        yield f"{_WORKS[name]} {format_quantity(min(values), unit, 3)}, {least / min(values):.3g} times below the least"
+        far = plain(least / min(values))
+        yield f"{_WORKS[name]} {format_quantity(min(values), unit, 3)}, {far} times below the least"
 
 
 def _measured(record: Mapping[str, Any], beyond: Sequence[str]) -> Measured:

@@ -43,6 +43,7 @@ from microrad.report.plotting.sheet import (
     shortened,
     stairs,
 )
+from microrad.report.quantities import are, counted, plain
 
 MOST_INPUTS, MOST_CELLS, MOST_POINTS = 14, 40, 1500
 _ACROSS = 3  # panels beside each other
@@ -251,8 +252,8 @@ def _sensitivity(group: Sequence[Sensitivity], keys: Sequence[str], number: int,
         "input makes by itself (first order), and with all its interactions (total); with intervals."
         + "".join(f" {note}." for note in notes)
     )
-    if len(keys) > len(shown):
-        caption += f" {len(keys) - len(shown)} inputs with smaller indices are in the table only."
+    if more := len(keys) - len(shown):
+        caption += f" {counted(more, 'input')} with smaller indices {are(more)} in the table only."
     names = ", ".join(each.output for each in group)
     return Figure(f"campaign-sensitivity-{number}", f"What matters to {names}", caption, sheet, columns)
 
@@ -459,7 +460,7 @@ def _numbered(values: Floats) -> Iterator[Field | Words]:
     for (row, column), number in np.ndenumerate(values):
         known_ = math.isfinite(number)
         tint = WHITE if known_ and number < 0.5 * (low + high) else BLACK
-        yield Words(f"{number:.3g}" if known_ else "none", column, row, tint, anchor="middle")
+        yield Words(plain(number) if known_ else "none", column, row, tint, anchor="middle")
 
 
 # --------------------------------------------------------------------------------------------------------------- worst

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 from microrad.campaign.records import Interval, Limit
 from microrad.core.units import UnitError, format_quantity, parse_quantity
-from microrad.report.quantities import duration, power_text, quantity, volume
+from microrad.report.quantities import duration, plain, power_text, quantity, volume
 
 _UNKNOWN = "not known"
 _LEAST_LOW = 1e-12
 """Lower end of a probability below which it reads 0."""
+_MOST_BELOW_ALL = 99.999_999_99
+"""Per cent that a probability reads at most where it is not 1."""
 SYMBOL = {"least": "≥", "most": "≤"}
 _LABELS = {"data_rate": "data_rate (possible)"}  # not to be taken for the mission's communication.data_rate
 
@@ -30,8 +32,9 @@ def share(probability: float) -> str:
         return power_text(probability, 2)
     rest = 1.0 - probability
     if 0.0 < rest < 0.1:
-        return f"{100.0 * probability:.{min(max(1 - math.floor(math.log10(100.0 * rest)), 1), 8)}f} %"
-    return f"{100.0 * probability:.3g} %"
+        decimals = max(1 - math.floor(math.log10(100.0 * rest)), 1)
+        return f"{min(100.0 * probability, _MOST_BELOW_ALL):.{min(decimals, 8)}f} %"
+    return f"{plain(100.0 * probability)} %"
 
 
 def is_share(name: str, unit: str) -> bool:
@@ -80,7 +83,7 @@ def bound(number: float, unit: str, name: str = "") -> str:
     if is_share(name, unit):
         return share(number)
     if unit in ("", "1"):
-        return f"{number:.4g}"
+        return plain(number, 4)
     by_unit = {"s": duration, "bit": volume}
     return by_unit[unit](number) if unit in by_unit else quantity(number, unit)
 
@@ -95,7 +98,7 @@ def ends(interval: Interval, unit: str, name: str = "") -> str:
     """
     low, high = (value(end, unit, name) for end in (interval.low, interval.high))
     if is_share(name, unit) and 0.0 <= interval.low < _LEAST_LOW:
-        low = "0 %" if high.endswith("%") else "0"
+        low = "0 %" if high.endswith("%") or math.isnan(interval.high) else "0"
     if math.isnan(interval.low):
         return "" if math.isnan(interval.high) else f"at most {high}"
     return f"at least {low}" if math.isnan(interval.high) else f"{low} to {high}"

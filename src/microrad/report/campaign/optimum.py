@@ -8,7 +8,7 @@ from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.optimisation.candidates import INTERVAL_CONFIDENCE, Candidate, Kept, percent
 from microrad.campaign.optimisation.search import Optimum
-from microrad.report.quantities import quantity
+from microrad.report.quantities import counted, quantity
 
 _SLACK = "for slack draw more rows (optimise.rows) or ask for a larger share (optimise.confidence)"
 
@@ -23,7 +23,7 @@ def optimum_text(optimum: Optimum) -> str:
         lines += ["", *_table(_limits(optimum)), *_legend(optimum)]
     if optimum.bound_by:
         lines += ["", f"Bound by: {', '.join(optimum.bound_by)}"]
-    count = f"{optimum.evaluations} candidates"
+    count = counted(optimum.evaluations, "candidate")
     lines += ["", count + (f", {optimum.refused} of them no mission" if optimum.refused else "")]
     return "\n".join([*lines, *(f"warning: {warning}" for warning in optimum.warnings)])
 

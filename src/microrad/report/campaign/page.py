@@ -1,5 +1,6 @@
 """A campaign as one page that loads nothing, with its pictures."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -63,7 +64,9 @@ def _grid(summary: CampaignSummary, cell: CellSummary | None, drawn: Sequence[Fi
     keys = len(summary.cells[0].values)
     every = [_table(tables.cell_table(summary, summary.cells), keys)]
     every += [_table(tables.limited_table(summary, summary.cells), keys)] if summary.limits else []
-    detail = "" if cell is None else f"Below in detail: {cell.label}, the first of those that miss a limit least."
+    known = cell is not None and summary.limits and not math.isnan(cell.missed.value)
+    which = "of those that miss a limit least" if known else "with results"
+    detail = "" if cell is None else f"Below in detail: {cell.label}, the first {which}."
     return told(*drawn, View("Every combination", every, folded=True), detail)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from microrad.campaign.records import CampaignSummary, CellSummary, Interval, OutputSummary, Sensitivity, Tail
 from microrad.report.campaign.numbers import complement, ends, label, limit_text, share, share_ends, value
-from microrad.report.quantities import minus
+from microrad.report.quantities import are, counted, minus
 from microrad.report.tables import Rows
 
 Row = tuple[str, ...]
@@ -205,4 +205,4 @@ def more_failed(summary: CampaignSummary, shown: int) -> str:
         shown: how many failed rows are shown.
     """
     more = sum(cell.failed for cell in summary.cells) - shown
-    return f"{more} more failed rows are in the export." if more > 0 else ""
+    return f"{counted(more, 'more failed row')} {are(more)} in the export." if more > 0 else ""

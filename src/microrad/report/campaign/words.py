@@ -86,8 +86,12 @@ def _said(summary: CampaignSummary, shown: CellSummary) -> str:
     """How likely a row keeps the limits, where some rows have results."""
     if not shown.outputs and shown.tail is not None:
         return (tail_sentences(summary, shown) or ["The radius that is wanted is not known from these rows."])[0]
-    if not summary.limits or math.isnan(shown.missed.value):
-        return f"{_rows(sum(good(cell) for cell in summary.cells))} with results; no limit is set."
+    count = sum(good(cell) for cell in summary.cells)
+    if not summary.limits:
+        return f"{_rows(count)} with results; no limit is set."
+    if math.isnan(shown.missed.value):
+        they = "it keeps" if count == 1 else "they keep"
+        return f"{_rows(count)} with results; whether {they} {_limits_named(summary)} is not known."
     if len(summary.cells) > 1:
         return _cells_said(summary, shown)
     return f"{_kept(shown, _limits_named(summary))}."
@@ -130,18 +134,20 @@ def _bound(words: str, probability: float) -> str:
 
 
 def _cells_said(summary: CampaignSummary, shown: CellSummary) -> str:
-    limits, count = _limits_named(summary), len(summary.cells)
+    limits = _limits_named(summary)
     known = [cell for cell in summary.cells if good(cell) and not math.isnan(cell.missed.value)]
+    count = f"{len(known)} combinations{' with results' * (len(known) < len(summary.cells))}"
     worst = max(known, key=lambda cell: cell.missed.value)
     if shown.missed.value == worst.missed.value:
-        return f"In each of {count} combinations {share(1.0 - worst.missed.value)} of the rows keep {limits}."
+        where = "the only combination with results" if len(known) == 1 else f"each of {count}"
+        return f"In {where} {share(1.0 - worst.missed.value)} of the rows keep {limits}."
     sure = f"intervals at {100.0 * shown.missed.confidence:g} %"
     kept, least = (share_ends(complement(cell.missed)) for cell in (shown, worst))
     whole = sum(cell.missed.value == 0.0 for cell in known)
     most = f"{shown.label} keeps {limits} most often, in {kept} of its rows"
     if whole > 1:
         most = f"{whole} keep {limits} in all of their rows, the first of them {shown.label}"
-    return f"Of {count} combinations, {most}; {worst.label} least often, in {least} ({sure})."
+    return f"Of {count}, {most}; {worst.label} least often, in {least} ({sure})."
 
 
 def matters(summary: CampaignSummary) -> list[str]:
@@ -205,8 +211,8 @@ def _worth(tail: Tail, radius_rad: float, past: Interval) -> str:
     variance = tail.variance.get(radius_rad, 0.0)
     if not variance:
         return ""
-    plain = past.value * (1.0 - past.value) / variance
-    return f" The variance of that estimate is {variance:.2g}, that of {plain:.2g} draws without importance sampling."
+    draws = _many(past.value * (1.0 - past.value) / variance)
+    return f" The variance of that estimate is {variance:.2g}, that of {draws} draws without importance sampling."
 
 
 def answers(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
@@ -232,10 +238,11 @@ def tail_method(tail: Tail) -> str:
 
 def _many(count: float) -> str:
     """A number in two digits, as it is spoken: "24 million"."""
+    count = float(f"{count:.2g}")
     for size, name in ((1e9, "billion"), (1e6, "million")):
         if count >= size:
-            return f"{float(f'{count / size:.2g}'):g} {name}"
-    return f"{float(f'{count:.2g}'):.0f}"
+            return f"{count / size:g} {name}"
+    return f"{count:.0f}"
 
 
 def _sure(interval: Interval, name: str = "", unit: str = "rad") -> str:

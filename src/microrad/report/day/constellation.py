@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from microrad.orbit.constellation import ConstellationPlan
-from microrad.report.quantities import duration, volume
+from microrad.report.quantities import are, counted, duration, volume
 from microrad.report.tables import Table
 from microrad.report.view import View, told, views_text
 
@@ -24,11 +24,12 @@ def plan_sentences(plan: ConstellationPlan) -> list[str]:
     each = "" if len(plan.relays) == 1 else " each"
     terminals = "one terminal" if plan.terminals == 1 else f"{plan.terminals} terminals"
     ground = f" and {_ground(plan)}" if plan.stations else ""
+    take, carry = ("takes", "carries") if len(plan.planned) == 1 else ("take", "carry")
     views, busy = plan.opportunities.start_s.size, float(np.sum(plan.by_satellite.busy_s))
     return [
         f"{satellites} {relays} of {terminals}{each}{ground}: in {duration(span)} "
-        f"{views} contacts in reach, {seen / 3600.0:.0f} h in all, of which {len(plan.planned)} sessions take "
-        f"{busy / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
+        f"{counted(views, 'contact')} in reach, {seen / 3600.0:.0f} h in all, of which "
+        f"{counted(len(plan.planned), 'session')} {take} {busy / 3600.0:.0f} h and {carry} {volume(plan.volume_bit)}.",
         f"A satellite has data for {duration(float(np.min(served)))} to {duration(float(np.max(served)))}, and waits "
         f"{duration(float(np.max(gaps)))} at most. Terminals in use: {used}.",
         f"In reach is where the link closes at its lowest rate, with a pointing loss of {plan.loss.loss_db:.2f} dB "
@@ -52,8 +53,9 @@ def _stations_words(plan: ConstellationPlan) -> list[str]:
     count = int(np.sum(plan.by_station.sessions))
     used = ", ".join(f"{name} {100 * use:.0f} %" for name, use in zip(plan.stations, plan.station_use, strict=True))
     return [
-        f"{count} of the sessions are with ground stations, above their masks, and are expected to carry "
-        f"{volume(float(np.sum(plan.by_station.volume_bit)))} under their availability. Terminals in use: {used}."
+        f"{count} of the sessions {are(count)} with ground stations, above their masks, and {are(count)} expected "
+        f"to carry {volume(float(np.sum(plan.by_station.volume_bit)))} under their availability. "
+        f"Terminals in use: {used}."
     ]
 
 

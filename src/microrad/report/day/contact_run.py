@@ -4,7 +4,7 @@ from typing import Any
 
 from microrad.report.data import fields
 from microrad.report.day.words import times
-from microrad.report.quantities import duration, minus, quantity, volume
+from microrad.report.quantities import counted, duration, minus, percent, quantity, volume
 from microrad.report.tables import Table
 from microrad.study.contact_run import ContactRun, State
 
@@ -23,19 +23,20 @@ def contact_sentences(run: ContactRun, number: int, controller: str, rate_bit_s:
     if run.data_s == 0.0:
         return [f"Contact {number} of {duration(length)} never comes to data: {run.log[-1].cause}."]
     before = run.first_data_s - c.start_s
-    lost = "lock is never lost in them"
+    them = "it" if len(run.windows) == 1 else "them"
+    lost = f"lock is never lost in {them}"
     if run.losses:
         every = duration(1.0 / run.losses_per_s)
-        lost = f"lock is lost {times(run.losses)} in them, once in {every}, which the time between them does not show"
+        lost = f"lock is lost {times(run.losses)} in {them}, once in {every}, which the rest of the time does not show"
     carried = ""
     if rate_bit_s is not None:
         carried = f": {volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
     return [
         f"Contact {number} ({duration(length)}) under {controller}: data begin {quantity(before, 's')} after the rise, "
         f"{quantity(spent[State.LOCK], 's')} of it to lock, and flow for {duration(spent[State.DATA])}, "
-        f"{100 * run.data_share:.1f} % of the contact{carried}. The fine loop is simulated in {len(run.windows)} "
-        f"windows, {duration(run.sampled_s)} in all, with the point-ahead and the rate of the line of sight of each; "
-        f"{lost}."
+        f"{100 * run.data_share:.1f} % of the contact{carried}. The fine loop is simulated in "
+        f"{counted(len(run.windows), 'window')}, {duration(run.sampled_s)} in all, with the point-ahead and the rate "
+        f"of the line of sight of each; {lost}."
     ]
 
 
@@ -67,7 +68,7 @@ def windows_table(run: ContactRun, quantile: float) -> Table:
             f"{w.quantile_rad * 1e6:.2f}",
             f"{w.largest_rad * 1e6:.2f}",
             minus(f"{w.lowest_margin_db:+.2f}"),
-            f"{100 * w.share_below:.2g} %",
+            percent(w.share_below),
         )
         for w in run.windows
     ]

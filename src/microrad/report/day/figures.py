@@ -31,7 +31,7 @@ from microrad.report.plotting.sheet import (
 )
 from microrad.report.plotting.sheet import rows as named_rows
 from microrad.report.plotting.swings import in_lines, swing_bars, swing_legend
-from microrad.report.quantities import duration
+from microrad.report.quantities import duration, plain
 from microrad.study.contact_run import ContactRun
 
 Curves = Mapping[str, tuple[Floats, Floats]]  # name: abscissa (n,), ordinate (n,)
@@ -362,7 +362,7 @@ def assumptions(swings: Sequence[Assumed], value: float, quantity: str) -> Figur
     """
     shown = swings[:MOST_BARS]
     if shown and math.isfinite(value):
-        sheet = _tornado(shown, value, f"{quantity}; as assumed: {value:.4g}")
+        sheet = _tornado(shown, value, f"{quantity}; as assumed: {plain(value, 4)}")
     else:
         sheet = empty("no assumption was varied" if math.isfinite(value) else f"{quantity}: no finite value")
     caption = f"{quantity[:1].upper()}{quantity[1:]}: one assumption at a time at its lower and at its higher value."

@@ -5,7 +5,7 @@ import math
 from microrad.orbit import Contact, Pass
 from microrad.orbit.day import NOTHING, DayStudy, Encounter, Numbers
 from microrad.report.day.words import contact_time, kilometres, percent, ratio_text
-from microrad.report.quantities import duration, volume
+from microrad.report.quantities import duration, plain, volume
 from microrad.report.tables import Table
 
 CONTACT_COLUMNS = (
@@ -76,7 +76,7 @@ def ways_table(day: DayStudy) -> Table:
         ("time in contact", *(contact_time(w.contact_s) for w in ways)),
         ("longest time without contact", *(duration(w.gap_s) for w in ways)),
         ("could carry", *(volume(w.capacity_bit) for w in ways)),
-        ("contacts without acquisition", f"{day.relay.failed_contacts:.3g}", *[""] * (len(ways) - 1)),
+        ("contacts without acquisition", plain(day.relay.failed_contacts), *[""] * (len(ways) - 1)),
         ("made by the instrument", *(volume(w.generated_bit) for w in ways)),
         ("lost for want of room", *(volume(w.lost_bit) for w in ways)),
         ("on board at most", *(volume(w.history.largest_stored_bit) for w in ways)),

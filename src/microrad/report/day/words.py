@@ -3,7 +3,7 @@
 import math
 
 from microrad.orbit.day import NOTHING, Closing, DayStudy, Numbers, Swing, Way
-from microrad.report.quantities import duration, quantity, volume
+from microrad.report.quantities import duration, plain, quantity, volume
 
 MATTERS = 1.1
 """Factor by which an assumption has to change the comparison to be named."""
@@ -55,7 +55,8 @@ def sky_words(day: DayStudy) -> list[str]:
     sky = day.sky
     if sky is None:
         return []
-    drawn = f"{percent(sky.any_drawn)} in the {day.operations.runs} drawn skies"
+    skies = "the one drawn sky" if day.operations.runs == 1 else f"the {day.operations.runs} drawn skies"
+    drawn = f"{percent(sky.any_drawn)} in {skies}"
     if len(sky.names) == 1:
         return [f"The sky over {sky.names[0]} is clear for {percent(sky.any_clear)} of the time ({drawn})."]
     return [
@@ -73,13 +74,13 @@ def _compared(day: DayStudy, ratio: float) -> str:
     """The direct downlink against the relay, in words; nothing where one of them carries nothing."""
     if not 0.0 < ratio < math.inf:
         return ""
-    return f"; the {day.view.partner} could carry {ratio:.3g} times as much"
+    return f"; the {day.view.partner} could carry {plain(ratio)} times as much"
 
 
 def times(count: float) -> str:
     """How often, in three digits; a count of more has all of its own."""
     shown = f"{count:.0f}" if count >= 100.0 else f"{count:.3g}"
-    return "once" if count == 1 else "never" if count == 0 else f"{shown} times"
+    return "once" if shown == "1" else "never" if count == 0 else f"{shown} times"
 
 
 def _how_much(day: DayStudy, way: Way, whole: bool = True) -> str:
@@ -152,7 +153,7 @@ def rate_words(day: DayStudy) -> str:
     circular = ""
     if day.derived and 0.0 < ends < furthest:
         circular = f" How far it reaches, and so the volume, follows from {'; '.join(day.derived)}."
-    lost = f"; {100 * day.loss.outage:.2g} % of the time is lost in outage" if day.loss.outage else ""
+    lost = f"; {plain(100 * day.loss.outage, 2)} % of the time is lost in outage" if day.loss.outage else ""
     idle = ""
     if all(c.largest_range_m < furthest for c in day.closings):
         idle = f" Beyond that no data flow: the contacts reach {kilometres(furthest)} km."
@@ -233,7 +234,7 @@ def _optical_ends(s: Swing) -> str:
 
 def ratio_text(n: Numbers) -> str:
     """Volume by relay over volume direct; nothing where the latter is none."""
-    return f"{n.ratio:.3g}" if n.direct_bit > 0.0 else ""
+    return plain(n.ratio) if n.direct_bit > 0.0 else ""
 
 
 def _both(s: Swing, name: str) -> str:

@@ -8,7 +8,7 @@ from microrad.link.error_budget import Contribution, Requirement, Share
 from microrad.link.error_budget.assembly import Judged
 from microrad.report.fine_pointing.windows import BY_GAINS, index_text
 from microrad.report.fine_pointing.words import source_name
-from microrad.report.quantities import angle, micro, percent
+from microrad.report.quantities import angle, micro, percent, plain, share_of_time
 
 AXES = {(0,): "about x", (1,): "about y", (2,): "about z", (0, 1): "radial"}
 _SHARE_OF = {
@@ -32,7 +32,7 @@ def source_shown(of: Contribution) -> str:
 def requirement_text(required: Requirement) -> str:
     """An index with its times, its share, and its axes, in words."""
     observed = "" if required.observation_s is None else f" within {format_quantity(required.observation_s, 's')}"
-    share = f"{percent(required.confidence, 4)} {_SHARE_OF[required.interpretation]}"
+    share = f"{share_of_time(required.confidence)} {_SHARE_OF[required.interpretation]}"
     return f"{index_text(required.index)}{observed}, {AXES[required.axes]}, {share}"
 
 
@@ -58,7 +58,7 @@ def allowed(share: Share) -> str:
         return ""
     if share.allowed == 0.0:
         return "nothing is left"
-    return "any" if math.isinf(share.allowed) else f"{share.allowed:.3g} times"
+    return "any" if math.isinf(share.allowed) else f"{plain(share.allowed)} times"
 
 
 def remarks(judged: Sequence[Judged]) -> list[str]:

@@ -11,7 +11,7 @@ from microrad.mirror.geometry import StrokeBudget
 from microrad.report.fine_pointing import words
 from microrad.report.fine_pointing.data import parameter_units, rms_by_source, sources
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import angle, given_angle, micro, percent, share_of_time
+from microrad.report.quantities import angle, given_angle, micro, percent, plain, share_of_time
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Points, Soft, Verdict, View, told
 
@@ -212,8 +212,8 @@ def design_cells(tuned: str, margins: LoopMargins, bound_by: Sequence[str]) -> t
         _or(f"{math.degrees(margins.phase_rad):.0f}", margins.phase_rad, "any"),
         "" if several else _or(f"{1e6 * margins.delay_s:.0f}", margins.delay_s, "any"),
         f"{margins.disk:.2f}",
-        f"{margins.bandwidth_hz:.3g}",
-        "" if several else _or(f"{margins.crossover_hz:.3g}", margins.crossover_hz, "none"),
+        plain(margins.bandwidth_hz),
+        "" if several else _or(plain(margins.crossover_hz), margins.crossover_hz, "none"),
         ", ".join(bound_by) or "nothing",
     )
 

@@ -14,7 +14,7 @@ from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mission.model import Amplifier, Control
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.report.quantities import angle, given_angle, minus, percent, share_of_time
+from microrad.report.quantities import angle, given_angle, minus, percent, plain, share_of_time
 
 NAMES: dict[str, str] = {
     Variant.GIVEN: "mission's mirror",
@@ -66,7 +66,7 @@ def tuned_to(values: Mapping[str, float], units: Mapping[str, str]) -> str:
         units: their SI units by name; a parameter without one is a plain number.
     """
     told = {
-        name: format_quantity(value, units[name], 3) if units.get(name) else f"{value:.3g}"
+        name: format_quantity(value, units[name], 3) if units.get(name) else plain(value)
         for name, value in values.items()
     }
     return minus(", ".join(f"{name} {value}" for name, value in told.items()))

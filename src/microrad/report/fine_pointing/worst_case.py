@@ -20,8 +20,9 @@ def worst_case_text(found: WorstCase, width: int) -> str:
     """
     extent, heads = found.extent, [index_name(index) for index in found.indices]
     about = (
-        f"The loop under {found.controller} on {extent.draws} mirrors drawn from what is known of its mirror, and on "
-        f"{found.corners} corners of its {len(found.most_sensitive)} most sensitive parameters at {extent.sigmas:g} "
+        f"The loop under {found.controller} on {counted(extent.draws, 'mirror')} drawn from what is known of its "
+        f"mirror, and on {counted(found.corners, 'corner')} of its "
+        f"{counted(len(found.most_sensitive), 'most sensitive parameter')} at {extent.sigmas:g} "
         "standard errors. In theory (linear); errors are radial rms."
     )
     rows: list[tuple[str, ...]] = [

@@ -22,7 +22,7 @@ from microrad.report.identification.page import check_identification
 from microrad.report.identification.terminal import MOST_LINES, warnings_text
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import counted, minus, quantity
+from microrad.report.quantities import counted, quantity, signed
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
 
@@ -254,10 +254,10 @@ def _dependence(found: CoupledIdentification, figures: Mapping[str, Figure]) -> 
         rows.append((drive, gain.text(float(of.gain[k]), 4), freq, error, f"{of.damping_ratio[k]:.3g}"))
     headings = ("drive, rms", f"gain ({gain.unit}/V)", "main resonance (Hz)", "± (Hz)", "damping ratio")
     change = (
-        f"From the smallest to the largest amplitude the gain changes by {of.gain_rise_percent:+.2g} % and the main "
-        f"resonance by {of.resonance_shift_hz:+.3g} Hz."
+        f"From the smallest to the largest amplitude the gain changes by {signed(of.gain_rise_percent, '%', 2)} and "
+        f"the main resonance by {signed(of.resonance_shift_hz, 'Hz')}."
     )
-    return View(title, told(minus(change), figures.get("amplitude"), Table("", headings, rows)))
+    return View(title, told(change, figures.get("amplitude"), Table("", headings, rows)))
 
 
 def _poles(own: Candidate) -> Table:

@@ -16,7 +16,7 @@ from microrad.report.identification.figures import banded_rms
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, thinned_by_logarithm
 from microrad.report.plotting.sheet import Axis, Legend, Line, Rule, Sheet, Span, between, grid, shortened
-from microrad.report.quantities import quantity
+from microrad.report.quantities import counted, quantity
 
 MOST = 4
 """Outputs, and drives, that a figure has panels for."""
@@ -143,7 +143,8 @@ def _left_out(found: CoupledIdentification) -> str:
     model = found.candidate().model
     if max(len(model.outputs), len(model.actuators)) <= MOST:
         return ""
-    return f" Of {len(model.outputs)} outputs and {len(model.actuators)} drives the first {MOST} are drawn."
+    both = f"{counted(len(model.outputs), 'output')} and {counted(len(model.actuators), 'drive')}"
+    return f" Of {both} the first {MOST} are drawn."
 
 
 # ------------------------------------------------------------------------------------------------------------ amplitude
@@ -176,7 +177,8 @@ def bands(found: CoupledIdentification) -> Figure:
     own, edges = found.candidate(), found.bands_hz
     outputs = own.model.outputs[:MOST]
     rows = [k for k in range(found.amplitudes_v.size) if np.isfinite(own.error_rms[k]).all()]
-    rows = rows if len(rows) <= MOST else [rows[0], rows[len(rows) // 2], rows[-1]]
+    some = "" if len(rows) <= MOST else f" Of {len(rows)} rms drives the first, the middle and the last are drawn."
+    rows = [rows[0], rows[len(rows) // 2], rows[-1]] if some else rows
     unit = words.scale(own.error_rms, words.unit_of(found))
     size = 0.9 + 1.7 * len(rows)
     sheet = Sheet(_WIDTH, size, (1.0,) * len(rows), (1.0,) * len(outputs), share_x=True, share_y=True)
@@ -195,7 +197,7 @@ def bands(found: CoupledIdentification) -> Figure:
         "drive. Beside it what the measured response of that amplitude leaves, which is what a linear model of its own "
         "would leave at least: distortion and noise. Of that, the noise by itself."
     )
-    return Figure("bands", "Error by output and band", caption + _left_out(found), sheet, {})
+    return Figure("bands", "Error by output and band", caption + _left_out(found) + some, sheet, {})
 
 
 def _levels(found: CoupledIdentification, number: int) -> list[tuple[Floats, dict[str, Any]]]:

@@ -238,7 +238,8 @@ def rests_on(found: CoupledIdentification) -> str:
     names = list(found.held_out[:_MOST_NAMES])
     more = len(found.held_out) - len(names)
     names += [f"{more} more"] if more else []
-    return f"This rests on {_listed(names)}; {counted(len(found.fitted), 'other record')} were fitted."
+    were = "was" if len(found.fitted) == 1 else "were"
+    return f"This rests on {_listed(names)}; {counted(len(found.fitted), 'other record')} {were} fitted."
 
 
 def _listed(texts: Sequence[str]) -> str:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
 from microrad.lab.identify.linear.axis import axis_error
 from microrad.lab.identify.linear.fit import LinearFit, fit_percent
@@ -23,6 +24,7 @@ from microrad.report.identification import words
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Legend, Line, Panel, Rule, Sheet, Span, between, grid, segments
+from microrad.report.quantities import plain
 
 MOST_RECORDINGS = 12  # drawn, a row each
 VIRTUAL = "virtual bench"
@@ -141,7 +143,7 @@ def excitation(everything: Sequence[Shown], found: Identification) -> Figure:
         if one.role == "broadband" and found.linear is not None:
             right.add(Span(*found.linear.excited_hz, True, SKY))
         elif one.sine is not None:
-            right.title = f"{one.sine.freq_hz:.4g} Hz"
+            right.title = format_quantity(one.sine.freq_hz, "Hz")
         right.add(segments(freq[seen], floor, amplitude[seen], BLACK, 0.8))
     caption = (
         "Drive of each recording, and the amplitude of its spectral lines (the strongest of those that fall on one "
@@ -368,9 +370,11 @@ def _loop(left: Panel, right: Panel, one: Shown, prediction: Prediction) -> None
     right.x, right.y = Axis("drive (V)"), Axis("output less line (µrad)")
     left.title = one.name + ("" if one.role == "loops" else f" ({one.role})")
     fitted, unseen = words.split_errors(prediction)
-    driven = "many frequencies" if one.sine is None else f"{one.sine.freq_hz:.3g} Hz, ± {one.sine.amplitude_v:.3g} V"
-    error = f"unseen {1e6 * unseen:.3g} µrad rms" if math.isfinite(unseen) else f"fitted {1e6 * fitted:.3g} µrad rms"
-    right.title = f"{driven}: {error}"
+    driven = "many frequencies"
+    if one.sine is not None:
+        driven = f"{format_quantity(one.sine.freq_hz, 'Hz', 3)}, ± {plain(one.sine.amplitude_v)} V"
+    error = f"unseen {plain(1e6 * unseen)}" if math.isfinite(unseen) else f"fitted {plain(1e6 * fitted)}"
+    right.title = f"{driven}: {error} µrad rms"
 
 
 def _stretch(one: Shown, part: slice) -> slice:

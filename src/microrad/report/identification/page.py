@@ -23,6 +23,7 @@ from microrad.report.identification.figures import identification_figures
 from microrad.report.identification.terminal import MOST_LINES, warnings_text
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
+from microrad.report.quantities import plain
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Points, Soft, Verbatim, Verdict, View, told, views_text
 
@@ -253,9 +254,9 @@ def _scan(linear: LinearFit) -> Table | None:
         (
             str(s.order),
             str(s.parameters),
-            f"{s.chi_square / max(s.freedom, 1):.4g}",
-            f"{s.criterion:.5g}",
-            f"{s.output_error_rms * 1e6:.4g} µrad",
+            plain(s.chi_square / max(s.freedom, 1), 4),
+            plain(s.criterion, 5),
+            f"{plain(s.output_error_rms * 1e6, 4)} µrad",
             "chosen" if s.order == linear.order else "",
         )
         for s in linear.scan
@@ -290,7 +291,7 @@ def _errors(found: Identification) -> Table:
     rows = []
     for recording, prediction in zip(found.recordings, words.chosen_predictions(found), strict=True):
         fitted, unseen = words.split_errors(prediction)
-        share = "" if math.isnan(unseen) else f"{100 * unseen / found.span_rad:.3g} %"
+        share = "" if math.isnan(unseen) else f"{plain(100 * unseen / found.span_rad)} %"
         name, drive = Cell(Path(recording.path).name, code=True), words.drive_text(recording, found.units.volts)
         rows.append((name, drive, _angle(fitted), _angle(unseen), share, str(prediction.clamped)))
     headings = ("file", "drive", "fitted, rms", "unseen, rms", "unseen, rms", "rate-clamped")
@@ -298,7 +299,7 @@ def _errors(found: Identification) -> Table:
 
 
 def _angle(value_rad: float) -> str:
-    return "" if math.isnan(value_rad) else f"{1e6 * value_rad:.3g} µrad"
+    return "" if math.isnan(value_rad) else f"{plain(1e6 * value_rad)} µrad"
 
 
 def _parameters(found: Identification, written: str) -> View:

@@ -8,7 +8,7 @@ from microrad.lab.identify.hysteresis.bouc_wen import PARAMETER_UNITS, PARAMETER
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.identify.statistics import rounded_to_error
-from microrad.report.quantities import minus
+from microrad.report.quantities import counted, minus, plain
 
 HIGH_CORRELATION = 0.95
 
@@ -147,13 +147,13 @@ def notes(fit: Fit) -> list[str]:
     found = [f"{text[0].upper()}{text[1:]}."]
     if pairs := correlations(fit):
         shown = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs[:6])
-        more = f" and {len(pairs) - 6} pairs more" if len(pairs) > 6 else ""
+        more = f" and {counted(len(pairs) - 6, 'pair')} more" if len(pairs) > 6 else ""
         found.append(minus(f"Correlated above {HIGH_CORRELATION:g}: {shown}{more}."))
     if isinstance(fit, BoucWenFit):
         value, error = fit.settled_hysteresis_rad
         found.append(
             f"Better fixed than its parts: the hysteresis of a slow settled loop, |epsilon| / (alpha + sign(epsilon) "
-            f"beta) = {to_error(1e6 * value, 1e6 * error)} ± {1e6 * error:.2g} µrad."
+            f"beta) = {to_error(1e6 * value, 1e6 * error)} ± {plain(1e6 * error, 2)} µrad."
         )
     found.append(
         f"Condition number {condition_number(fit):.3g}; the variances are inflated {colour(fit):.3g} times for the "

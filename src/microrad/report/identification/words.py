@@ -67,7 +67,7 @@ def drive_text(recording: Recording, volts: float) -> str:
     half = float(np.ptp(drive)) / 2
     middle = _rounded(float(drive.max() + drive.min()) / 2, half)
     kind = "many frequencies" if sine is None else format_quantity(sine.freq_hz, "Hz", 3)
-    return f"{kind}, ± {half:.3g} V about {middle:.3g} V"
+    return f"{kind}, ± {plain(half)} V about {plain(middle)} V"
 
 
 def _rounded(value: float, span: float) -> float:
@@ -96,7 +96,7 @@ def full_range_hz(found: Identification) -> float:
 def drive_range(found: Identification) -> tuple[str, str]:
     """The fitted drive range."""
     span = found.drive_max_v - found.drive_min_v
-    return f"{_rounded(found.drive_min_v, span):.4g} V", f"{_rounded(found.drive_max_v, span):.4g} V"
+    return f"{plain(_rounded(found.drive_min_v, span), 4)} V", f"{plain(_rounded(found.drive_max_v, span), 4)} V"
 
 
 def verdict(found: Identification, written: str | None = None) -> list[str]:

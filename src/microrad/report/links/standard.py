@@ -57,7 +57,7 @@ def number_text(asked: Asked) -> str:
 
 
 def _texts(held: Held) -> tuple[str, str]:
-    """What is asked, and what the mission has of it; a bound has as many digits as tell the two apart."""
+    """What is asked, and what the mission has of it; beside a bound it has the digits that tell the two apart."""
     asked = held.asked
     has = held.text or (_NOTHING if held.value is None else quantity(held.value, asked.unit))
     limits = [quantity(each, asked.unit, 4) for each in asked.values] if asked.unit else [*asked.texts]
@@ -66,6 +66,8 @@ def _texts(held: Held) -> tuple[str, str]:
             return _NOTHING, has
         case "between":
             text = " to ".join(limits)
+            if (value := held.value) is not None:
+                _, has = apart(min(asked.values, key=lambda limit: abs(limit - value)), value, asked.unit)
         case "on the grid":
             text = " + n \u00d7 ".join(limits)
         case "one of":

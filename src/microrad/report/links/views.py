@@ -23,7 +23,7 @@ from microrad.report.links.lines import LINES, line_names, lines_table
 from microrad.report.links.standard import standard_view
 from microrad.report.marks import marked
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import given_angle, minus, percent, power_text, quantity, share_of_time
+from microrad.report.quantities import given_angle, minus, percent, plain, power_text, quantity, share_of_time
 from microrad.report.requirements import derived_words, requirement_table
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verdict, View, opened, told
@@ -415,7 +415,7 @@ def cells(c: Performance) -> list[str]:
         share(c.short),
         f"{c.best.half_angle_rad * 1e6:.1f}{'*' if c.best.at_limit else ''}",
         f"{c.best.current_excess_db:.2f}",
-        "none" if math.isnan(c.data_rate_bit_s) else f"{c.data_rate_bit_s * 1e-6:.0f}",
+        "none" if math.isnan(c.data_rate_bit_s) else _mbit_s(c.data_rate_bit_s),
     ]
 
 
@@ -454,8 +454,13 @@ def residuals_sentence(found: LinkPerformance) -> str:
 
 def cost_cells(c: Cost) -> list[str]:
     """What hysteresis takes from one controller, as text: dB of margin, Mbit/s."""
-    rate = "" if math.isnan(c.data_rate_bit_s) else _fixed(-c.data_rate_bit_s * 1e-6, 0)
+    rate = "" if math.isnan(c.data_rate_bit_s) else _mbit_s(-c.data_rate_bit_s)
     return [_fixed(-c.margin_db, 2), rate]
+
+
+def _mbit_s(rate_bit_s: float) -> str:
+    """A data rate in Mbit/s, below ten of them with the digits that a whole number would not have."""
+    return plain(1e-6 * rate_bit_s + 0.0) if abs(rate_bit_s) < 1e7 else _fixed(1e-6 * rate_bit_s, 0)
 
 
 def _fixed(value: float, decimals: int) -> str:
@@ -473,7 +478,7 @@ def fade_sentences(cases: Sequence[Performance]) -> list[str]:
     said = "; ".join(
         f"{c.controller or c.source}: "
         + (
-            f"{c.fades_per_s:.3g} a second of {format_quantity(c.fade_s, 's', 3)} each"
+            f"{plain(c.fades_per_s)} a second of {format_quantity(c.fade_s, 's', 3)} each"
             if c.fades_per_s >= RAREST_FADE_HZ
             else "less than one a year"
         )

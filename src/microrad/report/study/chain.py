@@ -9,7 +9,7 @@ from microrad.loop.controller_study import Scene
 from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.marks import with_sign
-from microrad.report.quantities import counted, micro, quantity, share_of_time, signed, volume
+from microrad.report.quantities import counted, micro, plain, quantity, share_of_time, signed, volume
 from microrad.report.study.contributors import worst_axis
 from microrad.study.study import Study
 
@@ -134,7 +134,8 @@ def _loop(study: Study) -> Stage:
         design = fine.best.design
         lines.append(f"{design.name} at {format_quantity(1.0 / fine.scene.loop.timing.period_s, 'Hz')}")
         modulus = _signed(study, f"{design.loop_margins.modulus:.2f}", "fine_pointing.margins.modulus")
-        width = _signed(study, f"{design.loop_margins.bandwidth_hz:.3g} Hz wide", "fine_pointing.margins.bandwidth_hz")
+        width = f"{plain(design.loop_margins.bandwidth_hz)} Hz wide"
+        width = _signed(study, width, "fine_pointing.margins.bandwidth_hz")
         lines.append(f"modulus {modulus}, {width}")
     return Stage("Loop", tuple(lines))
 
