@@ -133,7 +133,7 @@ def percent(share: float, digits: int = 2) -> str:
     value = 100.0 * share
     if 0.0 < abs(value) < 1e-3:
         return f"{_LESS[int(value < 0.0)]} %"
-    return f"{format_beyond(value, 100.0, '', digits)} %"
+    return minus(f"{format_beyond(value, 100.0, '', digits)} %")
 
 
 def share_of_time(quantile: float) -> str:
