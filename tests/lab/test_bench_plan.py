@@ -680,7 +680,8 @@ def test_a_value_of_a_plan_that_is_none_is_told_in_all_words_on_its_line(refuse,
     changed_line = next(
         n for n, pair in enumerate(zip(TWO_AXES.split("\n"), text.split("\n"), strict=False), 1) if len(set(pair)) > 1
     )
-    assert fault.line == (0 if key == "excitation" else changed_line - (reason == "is missing"))
+    first = text.split("\n").index(next(row for row in text.split("\n") if row.startswith("[excitation."))) + 1
+    assert fault.line == (first if key == "excitation" else changed_line - (reason == "is missing"))
 
 
 @pytest.mark.parametrize(
