@@ -153,7 +153,7 @@ def test_a_line_of_the_pointing_budget_stands_in_every_face_once_the_mission_has
     ("margin_db", "rate_bit_s", "cells"),
     [
         (-3.104, -252.4e6, ["3.10", "252"]),
-        (-3.104, -622e3, ["3.10", "0.622"]),
+        (-3.104, -622e3, ["3.10", "0.62"]),
         (0.2, 3e6, ["\u22120.20", "\u22123"]),  # it can also gain
         (0.001, 3e5, ["0.00", "−0.3"]),
         (-0.004, 0.0, ["0.00", "0"]),

@@ -196,7 +196,7 @@ def test_what_hysteresis_costs_the_link(shipped, source, controller, margin_db, 
         if r[:3] == [source, controller, "given"]
     ]
     assert row[7] == f"{margin_db:+.2f}".replace("-", "\u2212")
-    assert row[-2:] == [f"{cost_db:.2f}", "0.278" if cost_mbit_s == 0.3 else f"{cost_mbit_s:.0f}"]
+    assert row[-2:] == [f"{cost_db:.2f}", "0.28" if cost_mbit_s == 0.3 else f"{cost_mbit_s:.0f}"]
 
 
 def test_the_beacon_brings_four_times_what_its_partners_sensor_needs(shipped):
