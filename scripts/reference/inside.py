@@ -102,7 +102,7 @@ def _parts(of: Any, depth: int) -> Iterator[float]:
     if of is None or depth > DEEPEST:
         yield 0.5
     elif isinstance(of, bool | int | float | complex | np.number | np.bool_):
-        yield from _array(np.atleast_1d(of)) if isinstance(of, complex) else (_magnitude(float(of)),)
+        yield from _array(np.atleast_1d(of)) if isinstance(of, complex) else (_magnitude(_float(of)),)
     elif isinstance(of, str):
         yield zlib.crc32(_CHANGING.sub("", of).encode()) % 9973 / 997.3
     elif isinstance(of, np.ndarray) and of.dtype.kind in "OUS":
@@ -186,6 +186,13 @@ def _array(of: np.ndarray[Any, Any]) -> Iterator[float]:
         flat = np.nan_to_num(flat, nan=-7.0, posinf=1e30, neginf=-1e30)
         weights = 1.0 + np.arange(flat.size) * 0.6180339887498949 % 1.0
         yield _magnitude(float(np.sum(np.abs(flat) * (weights + 0.4 * (flat < 0)))))
+
+
+def _float(number: Any) -> float:
+    try:
+        return float(number)
+    except OverflowError:  # an integer beyond all floats
+        return math.inf if number > 0 else -math.inf
 
 
 def _magnitude(number: float) -> float:

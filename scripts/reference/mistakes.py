@@ -14,10 +14,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-MOST = 40
+MOST = 60
 """Mistakes in a function, at most."""
 
-OF_A_LINE = 2
+OF_A_LINE = 3
 """Mistakes of a line of it."""
 
 Edit = tuple[ast.AST, str, object]

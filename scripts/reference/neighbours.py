@@ -11,7 +11,9 @@ import dataclasses
 import enum
 import gc
 import inspect
+import math
 import random
+import time
 import types
 import warnings
 import zlib
@@ -144,17 +146,21 @@ class Shown:
         self._wrong = dict(enumerate(mistakes.of(function.__code__)))
         self.left = set(self._wrong)
 
-    def by(self, arguments: Arguments, limit_s: float = LIMIT_S) -> tuple[float, list[int]]:
+    def by(self, arguments: Arguments, limit_s: float = LIMIT_S, all_s: float = math.inf) -> tuple[float, list[int]]:
         """What a call returns, and the mistakes with which it returns something else.
 
         Args:
             arguments: Of the call.
-            limit_s: Time for one call; raises TooLongError without a mistake.
+            limit_s: Processor time for one call; raises TooLongError without a mistake.
+            all_s: Time after which no further mistake is tried.
         """
+        end = time.monotonic() + all_s
         function = self._function
         x = returned(function, copy.deepcopy(arguments), limit_s)
         shown = []
         for number in sorted(self.left):
+            if time.monotonic() > end:
+                break
             cells = function.__closure__ if self._wrong[number].co_freevars else None
             wrong = types.FunctionType(self._wrong[number], function.__globals__, function.__name__, None, cells)
             try:

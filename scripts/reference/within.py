@@ -36,6 +36,7 @@ BY_CHANCE = (
 """Those, and functions whose values hang on the order of a set, change with each edit of the package, or name the
 place where Python is."""
 
+TESTS = str(Path(__file__).resolve().parents[2] / "tests")
 CORES = os.cpu_count
 FORKED = get_context("fork")
 
@@ -60,6 +61,9 @@ NEAR_EACH = 16
 TRIED_S = 1.0
 """Time for a function."""
 
+DIRECTLY = 2
+"""How many times as much of these there is for a function that tests call themselves: their arguments are about it."""
+
 
 class Watching(inside.Watch):
     """Takes from a test what its functions return, and keeps calls to vary them when it has passed."""
@@ -75,12 +79,14 @@ class Watching(inside.Watch):
         if self._is_busy:
             return
         call = self._entered[name] = self._entered[name] + 1
-        if not (numbers := self.varies(name, call)):
+        directly = frame.f_back is not None and frame.f_back.f_code.co_filename.startswith(TESTS)
+        times = DIRECTLY if directly else 1
+        if not (numbers := self.varies(name, call, times)):
             return
         self._is_busy = True
         try:
             if kept := neighbours.called(frame):
-                self._kept.append((name, call, numbers, kept))
+                self._kept.append((name, call, numbers, kept, times))
         finally:
             self._is_busy = False
 
@@ -97,13 +103,13 @@ class Holding(Watching):
             for call in sorted(calls) if name.endswith(neighbours.NEIGHBOURS) else ():
                 self._varied[name.removesuffix(neighbours.NEIGHBOURS)][call // 100].append(call % 100)
 
-    def varies(self, name, call):
+    def varies(self, name, call, times):
         """How the arguments of a call are varied: as it is held."""
         return self._varied[name].get(call) if name in self._varied else None
 
     def vary(self):
         """What functions return for arguments near those that were kept."""
-        for name, call, numbers, kept in self._kept:
+        for name, call, numbers, kept, _ in self._kept:
             for number, x in neighbours.values(kept, f"{name} {call}", numbers, neighbours.HANG_S):
                 self.values[f"{name}{neighbours.NEIGHBOURS}"][f"{call}{number:02d}"] = x
 
@@ -139,24 +145,25 @@ class Tried:
 
     def __init__(self):
         """None yet."""
-        self.copied = 0
+        self.copied = self.varied = 0
         self.given = set()
         self.took_s = 0.0
         self.shown = None
 
-    def is_worth_it(self):
-        """Whether a mistake is left, and time to look for it."""
+    def is_worth_it(self, times):
+        """Whether a mistake is left, and so many times the usual time to look for it."""
         is_left = self.shown is None or bool(self.shown.left)
-        return is_left and self.copied < COPIED and self.took_s < TRIED_S
+        return is_left and self.copied < times * COPIED and self.took_s < times * TRIED_S
 
-    def numbers(self, arguments):
+    def numbers(self, arguments, times):
         """How a call is made again with its arguments: as it was, and the first ones in variations, too."""
         x = inside.value(arguments)
         if x in self.given:
             return ()
         self.given.add(x)
-        k = len(self.given)
-        more = range(NEAR_EACH * k, NEAR_EACH * (k + 1)) if k <= VARIED else ()
+        if is_varied := self.varied < times * VARIED:
+            self.varied += 1
+        more = range(NEAR_EACH * self.varied, NEAR_EACH * (self.varied + 1)) if is_varied else ()
         return (neighbours.SAME, *(number % neighbours.SAME for number in more))
 
 
@@ -172,10 +179,10 @@ class Taking(Watching):
         self._of_file, self.tried = of_file, tried
         self.shown = defaultdict(dict)
 
-    def varies(self, name, call):
+    def varies(self, name, call, times):
         """Whether a call may be made again: how is decided when its test has passed."""
         tried = self.tried[name]
-        if call > FIRST_CALLS or not tried.is_worth_it():
+        if call > FIRST_CALLS or not tried.is_worth_it(times):
             return None
         tried.copied += 1
         return (neighbours.SAME,)
@@ -183,16 +190,17 @@ class Taking(Watching):
     def vary(self):
         """Calls again, first each as it was, until the time is over."""
         end = time.monotonic() + self.varying_s
-        for name, _, _, (function, *_) in self._kept:
+        for name, _, _, (function, *_), _ in self._kept:
             if self.tried[name].shown is None:
                 self.tried[name].shown = neighbours.Shown(function)
-        again = [(name, call, self.tried[name].numbers(kept[1]), kept) for name, call, _, kept in self._kept]
-        calls = [(name, call, number, kept) for name, call, numbers, kept in again for number in numbers[:1]]
-        calls += [(name, call, number, kept) for name, call, numbers, kept in again for number in numbers[1:]]
+        again = [(self.tried[each[0]].numbers(each[3][1], each[4]), each) for each in self._kept]
+        calls = [(number, each) for numbers, each in again for number in numbers[:1]]
+        calls += [(number, each) for numbers, each in again for number in numbers[1:]]
         while calls and time.monotonic() < end:
             calls = calls[self._made_again(calls, end) :]
             if calls and time.monotonic() < end:
-                self.tried[calls.pop(0)[0]].took_s = TRIED_S  # it has ended the process
+                _, (name, *_) = calls.pop(0)
+                self.tried[name].took_s = DIRECTLY * TRIED_S  # it has ended the process
 
     def _made_again(self, calls, end):
         """How many calls were made again, in a child: arguments that no caller gives, or mistakes, may end it."""
@@ -202,12 +210,15 @@ class Taking(Watching):
             child = FORKED.Process(target=self._send, args=(theirs, calls))
             child.start()
         theirs.close()
-        made = 0
+        made, heard = 0, time.monotonic()
         with ours, suppress(EOFError):
-            while made < len(calls) and ours.poll(max(end - time.monotonic(), 0.0)):
+            while made < len(calls):
+                number, (name, call, *_) = calls[made]
+                if not ours.poll(max(end - time.monotonic(), 0.0)):
+                    self.tried[name].took_s += time.monotonic() - heard
+                    break
                 x, shown, took_s = ours.recv()
-                name, call, number, _ = calls[made]
-                made += 1
+                made, heard = made + 1, time.monotonic()
                 self.tried[name].took_s += took_s
                 if shown:
                     self.tried[name].shown.left.difference_update(shown)
@@ -220,12 +231,12 @@ class Taking(Watching):
     def _send(self, theirs, calls):
         """What each returns, the mistakes that it shows, and seconds."""
         faulthandler.disable()
-        for name, call, number, kept in calls:
+        for number, (name, call, _, kept, times) in calls:
             tried, began, of = self.tried[name], time.monotonic(), (0.0, [])
-            if tried.shown.left and tried.took_s < TRIED_S:
+            if tried.shown.left and tried.took_s < times * TRIED_S:
                 with suppress(Exception, TooLongError):  # arguments that refuse to be such, or that take too long
                     if (changed := neighbours.varied(kept, f"{name} {call}", number)) is not None:
-                        of = tried.shown.by(changed, self.limit_s)
+                        of = tried.shown.by(changed, self.limit_s, times * TRIED_S - tried.took_s)
             tried.took_s += time.monotonic() - began
             theirs.send((*of, time.monotonic() - began))
 
