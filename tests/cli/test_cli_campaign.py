@@ -161,7 +161,9 @@ def test_ways_to_work_exclude_each_other(there, refused, means):
         assert "--threads, --workers and --scheduler exclude each other" in said
 
 
-@pytest.mark.parametrize("address", ["", "head", "http://head:8786", "tcp://head", "tcp://head:port", "a b:1"])
+@pytest.mark.parametrize(
+    "address", ["", "head", "http://head:8786", "tcp://head", "tcp://head:port", "a b:1", "tcp://head:65536"]
+)
 def test_what_is_no_address_of_a_scheduler_is_refused(there, refused, address):
     said = refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", address)
     assert f"--scheduler {address!r} is no address" in said and "tcp://head:8786" in said

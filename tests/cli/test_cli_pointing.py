@@ -713,3 +713,8 @@ def test_runs_answer_for_words_and_for_a_code_where_the_mission_asks_for_them(mo
     (((first, *others), *rest),) = asked
     assert (first, rest) == ("windows", ["loop", "made", "span", 5])
     assert others == ["words of 2e-06"] * (word is not None) + ["code"] * (fading is not None)
+
+
+def test_a_spacing_without_windows_is_refused(refused):
+    words = refused("worst-case", DEFAULT, "--mirror", IDENTIFIED, "--spacing", "1 min")
+    assert "--spacing is between windows: give --window, their length, too." in words

@@ -328,6 +328,7 @@ def test_a_path_that_begins_like_an_option_is_led_by_its_folder(path, argument):
         ('{"versions": 3, "mission": {}}', "mission", False), ('[{"versions": {}}]', "mission", False),
         ("", "mission", False),
         ('{"versions": {"microrad"', "mission", False), ("\xff", "mission", False), ("null", "mission", False),
+        ("[" * 100_000, "mission", False),
     ],
 )  # fmt: skip
 def test_a_folder_is_ours_by_the_versions_and_the_kind_of_its_manifest(tmp_path, manifest, kind, ours):

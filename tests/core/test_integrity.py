@@ -26,7 +26,7 @@ MANY = tuple(f"{k}.py" for k in range(7))
         (
             Integrity("commit 1", added=MANY),
             False,
-            "Against the commit 1: 7 added (0.py, 1.py, 2.py, 3.py, 4.py).",  # as many as can be read
+            "Against the commit 1: 7 added (0.py, 1.py, 2.py, 3.py, 4.py and 2 more).",
         ),
         (
             Integrity("commit 1", versions=("numpy 1 (tested: 2)", "scipy 3 (tested: 4)")),

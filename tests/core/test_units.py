@@ -319,7 +319,7 @@ def test_a_value_of_ten_digits_keeps_them_and_one_of_eleven_is_taken_as_computed
             UnitError,
             (
                 '"-12,75 dBm" has a comma: decimals take a point, thousands nothing; expected a power with '
-                'its unit, for example "-12.75 W"'
+                'its unit, for example "-12.75 dBm"'
             ),
         ),
         (
@@ -658,3 +658,28 @@ def test_a_text_is_shown_up_to_as_many_letters_as_a_quantity_may_have(letters, s
     with pytest.raises(UnitError) as refused:
         parse_quantity("x" * letters, "m")
     assert str(refused.value).startswith(f'"{shown}" ')
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "wanted", "read"),
+    [
+        ("1,064 nm", "m", "1.064 nm", 1.064e-9),
+        ("1,000,000 m", "m", "1000000 m", 1e6),
+        ("1,000.5 km", "m", "1000.5 km", 1.0005e6),
+        ("-12,75 dBm", "W", "-12.75 dBm", 10 ** (-12.75 / 10) * 1e-3),
+        ("1,5 furlong", "m", "1.5 m", 1.5),
+        ("1,5", "m", "1.5 m", 1.5),
+        (1e-40, "m", "5 m", 5.0),
+        (5000, "dB", "5 dB", 5.0),
+        ("1e400 watt", "W", "5 W", 5.0),
+    ],
+)
+def test_an_example_keeps_what_can_be_kept_of_a_value_and_can_be_read(value, unit, wanted, read):
+    with pytest.raises(UnitError) as refused:
+        parse_quantity(value, unit)
+    assert refused.value.example == wanted and parse_quantity(wanted, unit) == pytest.approx(read, rel=1e-12)
+
+
+@pytest.mark.parametrize(("value", "told"), [(-0.0, "0 m"), (0.0, "0 m"), (-1e-12, "-1 pm")])
+def test_nothing_has_no_sign(value, told):
+    assert format_quantity(value, "m") == told

@@ -920,11 +920,14 @@ def test_the_best_so_far_is_told_in_three_digits_behind_what_is_done():
 
 def test_a_choice_says_in_full_what_it_leaves_and_what_the_best_would():
     one = of_models(*THREE)
-    assert one._reason(2, 1) == (
+    assert one._reason(2, 1, [1, 2]) == (
         "small (20 parameters) leaves 1.25 % of the output on the held-out records; the least, 1.23 % by best with 30 "
         "parameters, is less by no more than two standard errors of the difference, so the smaller model is taken."
     )
-    assert one._reason(1, 1) == (
+    assert one._reason(1, 1, [0, 1]).endswith(
+        "less than any other; the models within its noise have no fewer parameters."
+    )
+    assert one._reason(1, 1, [1]) == (
         "best (30 parameters) leaves 1.23 % of the output on the held-out records, less than any other by more than "
         "its noise."
     )
@@ -1362,7 +1365,10 @@ def test_each_output_is_fitted_from_the_drive_that_makes_most_of_it():
 @pytest.mark.parametrize(
     ("positions", "told"),
     [
-        ([(1.0, 2.0)], "1 positions for 2 outputs (x, y); give one for each."),
+        ([(1.0, 2.0)], "1 position for 2 outputs (x, y); give one for each."),
+        ([(1.0, 2.0), (1.0,)], "the position of the output 'y' is (1.0,); give x and y in m."),
+        ([(1.0, 2.0), 3.0], "the position of the output 'y' is 3.0; give x and y in m."),
+        ([(float("nan"), 2.0), (1.0, 2.0)], "the position of the output 'x' is (nan, 2.0); give x and y in m."),
         ([(1.0, 2.0)] * 3, "3 positions for 2 outputs (x, y); give one for each."),
         ([], "0 positions for 2 outputs (x, y); give one for each."),
         (None, None),

@@ -377,7 +377,7 @@ def spoilt(values, at, value):
         (FREQ_HZ, 0 * FLAT, {}, "the response is 0 at all frequencies, so there is nothing to fit"),
         (1e-200 * FREQ_HZ, FLAT, {}, "frequency 1 is .* Hz, below 1e-30; check the unit of the column"),
         ([0.0], [1.0], {}, "the only frequency is 0 Hz; give frequencies above it"),
-        ([1.0], [1.0], {}, "1 frequencies cannot fix 1 poles; give at least 2 frequencies or a lower order"),
+        ([1.0], [1.0], {}, "1 frequency cannot fix 1 pole; give at least 2 frequencies or a lower order"),
         (FREQ_HZ, FLAT, {"orders": 0}, "the order is 0; give at least one pole"),
         (FREQ_HZ, FLAT, {"orders": [2, -1]}, "the order is -1; give at least one pole"),
         (FREQ_HZ, FLAT, {"orders": []}, "no order was given to choose from"),

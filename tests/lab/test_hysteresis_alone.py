@@ -129,7 +129,7 @@ def test_a_model_that_is_none_is_told_with_all_that_there_are_and_a_length_is_no
         "bouc_wen_asymmetric, bouc_wen_creep, prandtl_ishlinskii_rate, prandtl_ishlinskii_creep, "
         "prandtl_ishlinskii_rate_creep."
     )
-    with pytest.raises(IdentificationError, match=r"^the output is a length \(mm\) and a mirror model needs an angle"):
+    with pytest.raises(IdentificationError, match=r"^the output unit is 'mm'; use an angle"):
         fit_hysteresis(recorded(DRIVE * 1e-6), "prandtl_ishlinskii", output_unit="mm")
 
 
@@ -350,3 +350,11 @@ def test_a_fit_of_plays_answers_from_its_first_drive_value_by_the_weights_in_use
     assert (clamped, fit.parameter_count, fit.falling, fit.name) == (0, count, sign < 0, "prandtl_ishlinskii")
     assert fit.model == PrandtlIshlinskii((0.0, 0.5, 1.0), tuple(sign * w for w in weights), rate_limit_v_s=40.0)
     assert fit.admissible is True and fit.not_identified == ()
+
+
+def test_the_unit_of_the_output_is_that_of_an_angle():
+    with pytest.raises(IdentificationError) as caught:
+        fit_hysteresis(recorded(DRIVE * 1e-6), "bouc_wen", output_unit="um")
+    assert str(caught.value) == (
+        "the output unit is 'um'; use an angle (rad, mrad, urad): a displacement over its lever arm is one."
+    )

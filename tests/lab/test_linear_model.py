@@ -1048,3 +1048,15 @@ def test_the_fit_of_each_output_is_about_its_own_mean(errors, percent):
     sign = np.array([[1.0], [-1.0], [1.0], [-1.0]])
     measured = np.hstack([5.0 + 2.0 * sign, -300.0 + 10.0 * sign])
     np.testing.assert_allclose(fit_percent(measured, sign * errors), percent, atol=1e-9)
+
+
+@pytest.mark.parametrize("orders", [2.5, [1, 2.5, 3], (1.7, 3)])
+def test_an_order_is_a_whole_number(orders):
+    number = 1.7 if isinstance(orders, tuple) else 2.5
+    with pytest.raises(IdentificationError, match=rf"^the order is {number}; give a whole number of poles\.$"):
+        fit_module.given_orders(np.arange(1.0, 9.0), orders)
+
+
+def test_a_whole_number_of_another_type_is_an_order():
+    assert fit_module.given_orders(np.arange(1.0, 9.0), [3.0, 2]) == [2, 3]
+    assert fit_module.given_orders(np.arange(1.0, 9.0), 3.0) == [3]

@@ -262,10 +262,10 @@ def test_periods_that_do_not_fit():
         response_from_periods(records, skip_periods=2)
     with pytest.raises(IdentificationError, match="and -1 are to be dropped as transient; drop none or more"):
         response_from_periods(records, skip_periods=-1)
-    with pytest.raises(IdentificationError, match="1 records of one usable period for 1 inputs"):
+    with pytest.raises(IdentificationError, match="1 record of one usable period for 1 input leaves nothing"):
         response_from_periods(records[:1], skip_periods=1)
     two = periodic(mirror(2), [(multisine(0), multisine(1))])
-    with pytest.raises(IdentificationError, match="1 records for 2 inputs: at least 2 realisations"):
+    with pytest.raises(IdentificationError, match="1 record for 2 inputs: at least 2 realisations"):
         response_from_periods(two)
 
 
@@ -573,3 +573,28 @@ def test_standard_errors_are_split_where_there_is_something_to_split(noise, spar
     if distortion is not None:
         left = np.sqrt(np.maximum(np.array([9.0, 25.0]) - noise, 0.0))
         np.testing.assert_allclose(distortion, left[None, :, None] * [1.0, 2.0, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("band_hz", "bands", "message"),
+    [
+        (
+            (600.0, 900.0),
+            6,
+            "the band 600 to 900 Hz begins at or above half the sample rate, up to which a record shows something: "
+            "200 Hz; give a lower band.",
+        ),
+        ((5.0, 100.0), 0, "the number of bands is 0; give a whole number above 0."),
+        ((5.0, 100.0), -1, "the number of bands is -1; give a whole number above 0."),
+        ((5.0, 100.0), 2.5, "the number of bands is 2.5; give a whole number above 0."),
+    ],
+)
+def test_a_band_that_no_longer_record_has_is_refused_as_such(band_hz, bands, message):
+    assert told(response._band_edges, 0.5 * np.arange(401), *band_hz, bands, 8) == message
+
+
+def test_rates_that_hardly_differ_are_told_apart():
+    first, second = drawn(40, 1, 1, 1, name="a"), drawn(40, 1, 1, 2, name="b")
+    second = replace(second, rate_hz=first.rate_hz * (1 + 4e-7))
+    words = told(response.check_alike, [first, second], "used")
+    assert f"is {second.rate_hz:.17g} Hz and that of a {first.rate_hz:.17g} Hz" in words

@@ -1011,8 +1011,6 @@ def test_records_need_a_period_behind_those_that_are_skipped_and_a_step_a_sample
             IdentificationError, match=f"^r: the record has 2 whole periods and {skip} are to be skipped"
         ):
             fit_of._check(alike, skip, StiffnessOptions())
-    with pytest.raises(IdentificationError, match="0 whole periods and -1 are to be skipped"):
-        fit_of._check([replace(small(1.0), period_samples=17)], -1, StiffnessOptions())
 
 
 def test_amplitudes_are_of_one_class_as_long_as_each_is_near_the_next():
@@ -1506,3 +1504,14 @@ def test_a_record_of_other_channels_or_rate_is_not_predicted(inputs, outputs, ra
     with pytest.raises(IdentificationError) as refused:
         predicted_error(fit, record)
     assert str(refused.value) == (f"r: {told}, where the model has 2 and 1 at 400 Hz; give a record like those fitted.")
+
+
+def test_a_drive_at_rest_leaves_nothing_where_errors_rise_with_it(known):
+    fit = replace(known[0], error_rms=np.asarray(np.take(known[0].amplitudes, known[0].classes)))
+    assert trust(fit, np.zeros((64, known[0].mirror.B.shape[1]))).error_rms == 0.0
+
+
+def test_periods_to_be_skipped_are_none_or_more(known):
+    record = record_of(hysteretic_truth(), 0.9, 78)
+    with pytest.raises(IdentificationError, match=r"^-1 periods are to be skipped; skip none or more\.$"):
+        fit_of._check([record], -1, StiffnessOptions())

@@ -273,3 +273,22 @@ def test_the_gain_at_low_frequency_is_of_ten_lines_or_of_all_where_there_are_few
     np.testing.assert_allclose(gain, np.cos(0.5) * np.array(GAIN))
     np.testing.assert_allclose(error, np.full((2, 2), 0.3 / np.sqrt(10.0)))
     np.testing.assert_allclose(wiring._at_low_frequency(made(GAIN, error=0.3, lines=4))[1], np.full((2, 2), 0.15))
+
+
+@pytest.mark.parametrize(
+    "signs", [((1,),), ((1, 1), (1,)), ((1, 1, 1), (1, 1, 1)), ((1, 1),), ((1, 2), (1, 0)), 1, None]
+)
+def test_signs_are_a_row_for_each_output(signs):
+    response = made(GAIN)
+    if signs is None:
+        assert wiring.check_wiring("u.npy", response, TWO, signs) is None
+    else:
+        assert refusal(response, signs, TWO) == (
+            f"u.npy: signs are {signs}; give 2 rows of 2 numbers each, one row for each output and in it 1, -1 or 0 "
+            "for each drive."
+        )
+
+
+def test_of_records_without_noise_each_contradiction_is_certain():
+    told = refusal(made(GAIN, error=0.0), ((-1, 0), (0, 0)), TWO)
+    assert told.startswith("u.npy: at low frequency the output 'y0' rises with the drive 'u0', and `signs` says")

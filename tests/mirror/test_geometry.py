@@ -317,10 +317,10 @@ def test_lines_carry_their_sources_and_no_demand_leaves_any_magnification():
         ({"travel_rad": math.inf}, "travel_rad is inf"),
         (
             {"usable_travel_rad": 3e-3},
-            r"usable_travel_rad is 0\.003, of a travel of 2\.5 mrad from stop to stop; give what the drive range "
+            r"usable_travel_rad is 3 mrad, of a travel of 2\.5 mrad from stop to stop; give what the drive range "
             "leaves of that travel, above 0 rad and not beyond it$",
         ),
-        ({"usable_travel_rad": 0.0}, "usable_travel_rad is 0, of a travel"),
+        ({"usable_travel_rad": 0.0}, "usable_travel_rad is 0 rad, of a travel"),
         ({"usable_travel_rad": math.nan}, "usable_travel_rad is nan"),
         ({"travel_angle": "line-of-sight"}, 'travel_angle is \'line-of-sight\'; choose "optical" or "mechanical"'),
     ],
@@ -529,3 +529,10 @@ def test_the_budget_of_a_turned_tripod_has_the_lines_of_each_actuator(angle):
             f"half range at the line of sight: x 70 µrad, y 20 µrad; along ({along[0]:.3g}, {along[1]:.3g})"
         )
         assert (each.travel_angle, each.travel_rad, each.usable_travel_rad) == (angle, 0.02, 0.02)
+
+
+def test_a_usable_travel_a_hair_beyond_the_travel_is_told_in_digits():
+    with pytest.raises(ValueError, match=r"usable_travel_rad is 10\.0000001 mrad, of a travel of 10 mrad from stop"):
+        stroke_budget(
+            Geometry("optical"), demand(), travel_rad=0.01, travel_angle="optical", usable_travel_rad=0.0100000001
+        )

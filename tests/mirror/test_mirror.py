@@ -3,6 +3,7 @@
 import re
 from dataclasses import astuple, replace
 from math import exp, inf, nan, pi
+from types import SimpleNamespace
 
 import numba
 import numpy as np
@@ -568,7 +569,7 @@ def about_the_linear_part(table, **changed):
         (0.5, ["pole at 0.5 Hz lies outside the excited band (1 to 4096 Hz): drift fitted as dynamics"]),
         (1.0, []),
         (4096.0, []),
-        (8192.0, ["pole at 8.19e+03 Hz lies outside the excited band (1 to 4096 Hz): extrapolated"]),
+        (8192.0, ["pole at 8190 Hz lies outside the excited band (1 to 4096 Hz): extrapolated"]),
     ],
 )
 def test_a_root_at_an_end_of_the_excited_band_lies_in_it(table, pole_hz, words):
@@ -1295,3 +1296,21 @@ def test_a_mirror_refuses_creep_whose_weights_do_not_fit_its_lags(bottom, consta
     words = "creep of 1 weights and the time constants .*: give as many weights, and time constants above 0"
     with pytest.raises(ValueError, match=words):
         Mirror.of(1e-5, [1.0], bottom, creep=Creep((1e-6,), constants))
+
+
+def test_small_numbers_of_a_summary_are_not_rounded_to_none(table):
+    slow = with_linear(table, poles_hz=(3.0,), pole_dampings=(0.5,), excited_from_hz=0.1)
+    summary = mirror_summary.summarise(slow)
+    assert "in the flat band from 0.1 to 0.3 Hz " in str(summary)
+    creeping = replace(summary, creep=mirror_summary.Creep((1e-6,), (0.1,)))
+    assert str(creeping).count("% of the gain in the long run, with a lag of 0.1 s\n") == 1
+    assert [mirror_summary._mrad_v(x) for x in (-3e-7, 1e-5, 0.5)] == ["-0.0003", "0.010", "500.000"]
+
+
+def test_a_rate_below_one_volt_a_second_is_told_in_digits():
+    model = mirror_summary.BoucWen(1e-6, 1e-7, 1.0, 0.0, 0.0, 0.0)
+    limited = SimpleNamespace(reversal_slope_rad_v=lambda: 1.0, admissible_rate_v_s=0.25, rate_limit_v_s=10.0)
+    assert not isinstance(model, mirror_summary.PrandtlIshlinskii)
+    assert mirror_summary._admissibility(limited) == (
+        "the slope after a reversal stays positive only up to 0.25 V/s before the reversal",
+    )

@@ -56,13 +56,14 @@ _Scheduler = Annotated[
 
 
 _BEGINS = {".csv": b"cell,", ".parquet": b"PAR1", ".nc": b"\x89HDF"}  # as what microrad exports does
-_ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:\d{1,5}")  # those that Dask knows
+_ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:(?P<port>\d{1,5})")  # those that Dask knows
+_MOST_PORT = 65_535
 
 
 def _means(threads: int | None, workers: int | None, scheduler: str | None) -> "Means":
     if sum(each is not None for each in (threads, workers, scheduler)) > 1:
         raise Refusal("--threads, --workers and --scheduler exclude each other; give one of them.")
-    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+    if scheduler is not None and not ((found := _ADDRESS.fullmatch(scheduler)) and int(found["port"]) <= _MOST_PORT):
         raise Refusal(f"--scheduler {scheduler!r} is no address; `dask scheduler` prints its own, tcp://head:8786 say.")
     from microrad.campaign.run import Means
 

@@ -10,6 +10,7 @@ from microrad.cli.frame import (
     UNMET,
     Json,
     Outcome,
+    Refusal,
     app,
     command,
     examples,
@@ -46,6 +47,8 @@ def worst_case(
     drawn mirrors and on the corners of the parameters that matter most, and simulates the one with the smallest margin.
     The exit code is 1 when the loop is unstable on one of them.
     """
+    if spacing and not window:
+        raise Refusal("--spacing is between windows: give --window, their length, too.")
     from microrad import mirror as mirror_room
     from microrad.link import arrival_of, tracking_light_w
     from microrad.loop import controller_study, coupled_study

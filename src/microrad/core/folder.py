@@ -90,7 +90,7 @@ def _ours(manifest: Path, kind: str) -> bool:
     try:
         data = json.loads(read_bytes(manifest, _MOST_MANIFEST))
         return "microrad" in data["versions"] and kind in data
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return False
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 _PACKAGE = Path(__file__).resolve().parents[1]
 _PROJECT = _PACKAGE.parents[1]
 _CONSTRAINTS = _PACKAGE / "constraints.txt", _PROJECT / "constraints.txt"
+_MOST_LISTED = 5
 """Where the tested versions stand: in a wheel, and in the project's folder."""
 
 
@@ -44,9 +45,14 @@ class Integrity:
         if not self.against:
             return "The files of the package could not be held against anything: there is no record of them."
         parts = {"changed": self.changed, "missing": self.missing, "added": self.added}
-        said = [f"{len(files)} {what} ({', '.join(files[:5])})" for what, files in parts.items() if files]
+        said = [f"{len(files)} {what} ({_listed(files)})" for what, files in parts.items() if files]
         files = f"Against the {self.against}: {'; '.join(said) if said else 'every file as recorded'}."
         return f"{files} Not the tested version: {', '.join(self.versions)}." if self.versions else files
+
+
+def _listed(files: tuple[str, ...]) -> str:
+    more = f" and {len(files) - _MOST_LISTED} more" if len(files) > _MOST_LISTED else ""
+    return ", ".join(files[:_MOST_LISTED]) + more
 
 
 def integrity() -> Integrity:

@@ -123,7 +123,7 @@ _KINDS = {
 }
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-_COMMA_NUMBER = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_COMMA_NUMBER = re.compile(r"[+-]?[0-9]+(?:,[0-9]+)+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]{1,3})?")
 _FACTOR = re.compile(r"([A-Za-zµμ]+)(?:\^?([1-9]))?")
 _ROOT = re.compile(r"sqrt\(([A-Za-zµμ]+)\)|√([A-Za-zµμ]+)")
 
@@ -196,13 +196,23 @@ def parse_quantity(text: object, unit: str, typical: str = "") -> float:
         return _read(text, unit)
     except _RefusedError as refused:
         noun, usual = kind_of(unit)
-        example = f"{refused.number} {refused.unit or typical or usual}"
+        usual = typical or usual
+        tried = (f"{number} {own or usual}" for number in (refused.number, "5") for own in (refused.unit, ""))
+        example = next((each for each in tried if _is_read(each, unit)), f"5 {usual}")
         raise UnitError(text, str(refused), f"{noun} with its unit", example) from None
 
 
 def kind_of(unit: str) -> tuple[str, str]:
     """What a quantity in the SI unit `unit` is called ("a power") and the unit in which an example is written."""
     return _KINDS.get(unit, (f"a quantity in {unit}", unit))
+
+
+def _is_read(text: str, unit: str) -> bool:
+    try:
+        _read(text, unit)
+    except _RefusedError:
+        return False
+    return True
 
 
 def _read(text: object, unit: str) -> float:
@@ -227,7 +237,9 @@ def _read(text: object, unit: str) -> float:
 def _split(text: str) -> tuple[str, str]:
     """Number and unit of `text`, both still text."""
     if match := _COMMA_NUMBER.match(text):
-        raise _RefusedError("has a comma: decimals take a point, thousands nothing", match[0].replace(",", "."))
+        is_decimal = match[0].count(",") == 1 and "." not in match[0]
+        number, symbol = match[0].replace(",", "." if is_decimal else ""), text[match.end() :].removeprefix(" ")
+        raise _RefusedError("has a comma: decimals take a point, thousands nothing", number, symbol)
     match = _NUMBER.match(text)
     if match is None:
         raise _RefusedError("does not begin with a plain number")
@@ -331,7 +343,7 @@ def plain(value: float, digits: int = 3) -> str:
         value: The number.
         digits: Significant digits.
     """
-    return f"{float(f'{value:.{digits}g}'):.15g}"
+    return f"{float(f'{value:.{digits}g}') + 0.0:.15g}"  # 0, not -0
 
 
 def counted(number: int, noun: str) -> str:

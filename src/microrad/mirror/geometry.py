@@ -14,7 +14,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
-from microrad.core.units import format_quantity
+from microrad.core.units import format_beyond, format_quantity
 from microrad.mission.fields import Bounded, Quantity, Share
 
 WORST_CONDITION = 1e4
@@ -335,7 +335,8 @@ def _usable_travel(travel_rad: float, usable_travel_rad: float | None) -> float:
     usable = travel_rad if usable_travel_rad is None else usable_travel_rad
     if not 0.0 < usable <= travel_rad:
         raise ValueError(
-            f"stroke budget: usable_travel_rad is {usable:g}, of a travel of {format_quantity(travel_rad, 'rad')} from "
+            f"stroke budget: usable_travel_rad is {format_beyond(usable, travel_rad, 'rad')}, of a travel of "
+            f"{format_quantity(travel_rad, 'rad')} from "
             "stop to stop; give what the drive range leaves of that travel, above 0 rad and not beyond it"
         )
     return usable

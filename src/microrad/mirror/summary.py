@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import lti
+from microrad.core.units import plain
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii, slow_gain
 from microrad.mirror.model import creep_model, hysteresis_model, linear_part
 from microrad.mission.tables import mirror as mirror_table
@@ -44,18 +45,18 @@ class Summary:
         kind = "Bouc-Wen" if bouc_wen else "Prandtl-Ishlinskii"
         lines = [f"{self.name}: {self.composition}, {kind} hysteresis"]
         if self.roots:
+            top = f"{self.flat_band_hz[1]:{'.0f' if self.flat_band_hz[1] >= 10.0 else '.2g'}}"
             lines += [
                 f"  linear part divided by {self.normalised_by:.5f}, its magnitude at {self.normalise_at_hz:g} Hz",
                 f"  gain at DC {self.dc_gain:.5f}, in the flat band from {self.flat_band_hz[0]:g} to "
-                f"{self.flat_band_hz[1]:.0f} Hz {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
+                f"{top} Hz {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
             ]
             lines += [f"  {r.kind} at {r.frequency_hz:.4g} Hz, damping {r.damping:.3f}" for r in self.roots]
         if self.creep.weights_rad_v:
             share = 100.0 * math.fsum(self.creep.weights_rad_v) / slow_gain(self.model)
             first, last = self.creep.time_constants_s[0], self.creep.time_constants_s[-1]
-            lines.append(
-                f"  creep adds {share:.3g} % of the gain in the long run, with lags from {first:g} s to {last:g} s"
-            )
+            lags = f"lags from {first:g} s to {last:g} s" if first < last else f"a lag of {first:g} s"
+            lines.append(f"  creep adds {share:.3g} % of the gain in the long run, with {lags}")
         limit = f"{self.rate_limit_v_s:.4g} V/s"
         lines += [
             f"  rate in the hysteresis held at {limit}; clamped samples are counted"
@@ -106,7 +107,7 @@ def summarise(table: mirror_table.Mirror) -> Summary:
         gain = np.abs(lti.frequency_response(system, np.array([0.0, *np.geomspace(*flat, 100)]))[:, 0, 0]) * abs(by)
         dc, band = float(gain[0]), (float(gain[1:].min()), float(gain[1:].max()))
         warnings += [
-            f"{r.kind} at {r.frequency_hz:.3g} Hz lies outside the excited band "
+            f"{r.kind} at {plain(r.frequency_hz)} Hz lies outside the excited band "
             f"({table.linear.excited_from_hz:g} to {table.linear.excited_to_hz:g} Hz)"
             + (": drift fitted as dynamics" if r.frequency_hz < table.linear.excited_from_hz else ": extrapolated")
             for r in roots
@@ -138,10 +139,15 @@ def _admissibility(model: BoucWen | PrandtlIshlinskii) -> tuple[str, ...]:
     slope, rate = model.reversal_slope_rad_v(), model.admissible_rate_v_s
     if slope < 0.0:
         return (
-            f"not physical at reversals: the local slope falls to {slope * 1e3:.3f} mrad/V against d1 = "
-            f"{model.d1_rad_v * 1e3:.3f} mrad/V, so the modelled mirror first moves the wrong way, "
+            f"not physical at reversals: the local slope falls to {_mrad_v(slope)} mrad/V against d1 = "
+            f"{_mrad_v(model.d1_rad_v)} mrad/V, so the modelled mirror first moves the wrong way, "
             f"by {model.wrong_way_rad * 1e6:.1f} µrad on a slow drive",
         )
     if rate < model.rate_limit_v_s:
-        return (f"the slope after a reversal stays positive only up to {math.floor(rate)} V/s before the reversal",)
+        shown = math.floor(rate) if rate >= 10.0 else f"{rate:.2g}"
+        return (f"the slope after a reversal stays positive only up to {shown} V/s before the reversal",)
     return ()
+
+
+def _mrad_v(value_rad_v: float) -> str:
+    return f"{value_rad_v * 1e3:{'.3f' if abs(value_rad_v) >= 1e-5 else '.3g'}}"

@@ -82,6 +82,7 @@ class Units:
 
 
 DEFAULT_UNITS = Units()
+ANGLES = tuple(_RADIANS)
 
 
 @dataclass(frozen=True, eq=False)

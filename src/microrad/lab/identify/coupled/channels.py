@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from microrad.core.arrays import Floats, Integers
+from microrad.core.units import counted
 from microrad.lab.identify.linear.response import check_alike
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness.fit import amplitude_classes
@@ -175,8 +176,12 @@ def _outputs(
         return tuple(Output(name, quantity, None) for name in names)
     if len(positions_m) != len(names):
         raise IdentificationError(
-            f"{len(positions_m)} positions for {len(names)} outputs ({', '.join(names)}); give one for each."
+            f"{counted(len(positions_m), 'position')} for {counted(len(names), 'output')} ({', '.join(names)}); give "
+            "one for each."
         )
+    for name, place in zip(names, positions_m, strict=True):
+        if np.shape(place) != (2,) or not np.all(np.isfinite(place)):
+            raise IdentificationError(f"the position of the output '{name}' is {place}; give x and y in m.")
     return tuple(
         Output(name, quantity, (float(place[0]), float(place[1])))
         for name, place in zip(names, positions_m, strict=True)

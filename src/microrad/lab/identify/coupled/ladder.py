@@ -245,7 +245,7 @@ class _Ladder:
         return CoupledIdentification(
             candidates=tuple(candidates),
             chosen=candidates[chosen].name,
-            reason=self._reason(chosen, best),
+            reason=self._reason(chosen, best, ties),
             within_noise=tuple(candidates[k].name for k in ties),
             warnings=tuple(self._warnings(candidates[chosen], candidates[best])),
             refused=tuple(self.refused),
@@ -296,12 +296,14 @@ class _Ladder:
                 "may have less."
             )
 
-    def _reason(self, chosen: int, best: int) -> str:
+    def _reason(self, chosen: int, best: int, ties: Sequence[int]) -> str:
         own, least = self.found[chosen][0], self.found[best][0]
         text = (
             f"{own.name} ({own.parameters} parameters) leaves {100 * own.error_share:.3g} % of the output on the "
             "held-out records"
         )
+        if chosen == best and len(ties) > 1:
+            return f"{text}, less than any other; the models within its noise have no fewer parameters."
         if chosen == best:
             return f"{text}, less than any other by more than its noise."
         return (

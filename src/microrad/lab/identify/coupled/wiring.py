@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import counted
 from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.lab.identify.records import IdentificationError
 from microrad.mirror.coupled import Output
@@ -46,7 +47,7 @@ def check_wiring(
     _check_moves(path, found)
     gain, error = _at_low_frequency(found)
     if signs is not None:
-        _check_signs(path, found, gain, error, np.array(signs, dtype=float))
+        _check_signs(path, found, gain, np.maximum(error, 1e-300), _stated(path, signs, gain.shape))
     places = [output.position_m for output in outputs if output.position_m is not None]
     if len(places) >= 4:
         _check_flat(path, found, gain, np.array(places))
@@ -83,6 +84,21 @@ def _at_low_frequency(found: FrequencyResponse) -> tuple[Floats, Floats]:
     count = found.response[low].shape[0]
     error = np.sqrt(np.sum(found.standard_error[low] ** 2, axis=0)) / count
     return found.response[low].real.mean(axis=0), error
+
+
+def _stated(path: str, signs: Sequence[Sequence[int]], shape: tuple[int, ...]) -> Floats:
+    """The signs that are stated, of the shape (outputs, inputs)."""
+    try:
+        stated = np.array(signs, dtype=float)
+    except (TypeError, ValueError):
+        stated = np.zeros(0)
+    if stated.shape != shape or not np.isin(stated, (-1.0, 0.0, 1.0)).all():
+        rows, columns = counted(shape[0], "row"), counted(shape[1], "number")
+        raise IdentificationError(
+            f"{path}: signs are {signs}; give {rows} of {columns} each, one row for each output and in it 1, -1 or 0 "
+            "for each drive."
+        )
+    return stated
 
 
 def _check_signs(path: str, found: FrequencyResponse, gain: Floats, error: Floats, signs: Floats) -> None:

@@ -11,7 +11,7 @@ from microrad.core.progress import Progress
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
-from microrad.lab.identify.records import IdentificationError, Units
+from microrad.lab.identify.records import ANGLES, IdentificationError, Units
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 
@@ -103,6 +103,11 @@ def fit_hysteresis(
     if model not in STATIC_FORMS:
         raise IdentificationError(f"no hysteresis model is called '{model}'; there are {', '.join(STATIC_FORMS)}.")
     several = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    if output_unit not in ANGLES:
+        raise IdentificationError(
+            f"the output unit is '{output_unit}'; use an angle ({', '.join(ANGLES)}): a displacement over its lever "
+            "arm is one."
+        )
     units = Units(input_unit, output_unit)
     fit: PrandtlIshlinskiiFit | BoucWenFit | JointFit
     if model == "prandtl_ishlinskii":

@@ -140,10 +140,10 @@ def given_orders(freq_hz: Floats, orders: int | Sequence[int]) -> list[int]:
     Raises:
         IdentificationError: If none is given, or one is below 1 or beyond what so many frequencies can fix.
     """
-    several = [orders] if isinstance(orders, int | np.integer) else list(orders)
+    several = [orders] if isinstance(orders, int | float | np.number) else list(orders)
     if not several:
         raise IdentificationError("no order was given to choose from; name at least one number of states.")
-    for order in (min(several), max(several)):
+    for order in (min(several), max(several), *several):
         check_order(freq_hz, order)
     return sorted({int(order) for order in several})
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from microrad.core.arrays import Complexes, Floats, Integers
 from microrad.core.labelled import TEXT, Dataset, Group, variables
-from microrad.core.units import LEAST, MOST
+from microrad.core.units import LEAST, MOST, counted
 from microrad.lab.identify.linear.modal import Hold
 from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
@@ -209,8 +209,10 @@ def check_alike(records: Sequence[Recording], done: str) -> None:
     first = records[0]
     for other in records[1:]:
         if other.rate_hz != first.rate_hz:
+            short, long = ([f"{r.rate_hz:{form}}" for r in (other, first)] for form in ("g", ".17g"))
+            own, rate = short if short[0] != short[1] else long
             raise IdentificationError(
-                f"{other.path}: the sample rate is {other.rate_hz:g} Hz and that of {first.path} {first.rate_hz:g} Hz; "
+                f"{other.path}: the sample rate is {own} Hz and that of {first.path} {rate} Hz; "
                 f"records that are {done} together must share one rate."
             )
         if other.drive.shape[1] != first.drive.shape[1] or other.output.shape[1] != first.output.shape[1]:
@@ -250,7 +252,14 @@ def _band_edges(freq: Floats, low: float, high: float, bands: int, lines: int) -
     """Half-open line ranges: logarithmic, each with at least `lines` lines, up to but without half the rate."""
     if not LEAST <= low < high <= MOST:
         raise IdentificationError(f"the band {low:g} to {high:g} Hz is empty; give a lower and a higher frequency.")
+    if not isinstance(bands, int | np.integer) or bands < 1:
+        raise IdentificationError(f"the number of bands is {bands}; give a whole number above 0.")
     last = freq.size - 1
+    if low >= freq[last]:
+        raise IdentificationError(
+            f"the band {low:g} to {high:g} Hz begins at or above half the sample rate, up to which a record shows "
+            f"something: {freq[last]:g} Hz; give a lower band."
+        )
     marks = np.clip(np.round(np.geomspace(float(low), float(high), bands + 1) / freq[1]), 1, last).astype(int)
     edges, start = [], int(marks[0])
     for mark in marks[1:]:
@@ -385,12 +394,13 @@ def response_from_periods(records: Sequence[Recording], *, skip_periods: int = 0
     m, p, _, inputs = drive.shape
     if m < inputs:
         raise IdentificationError(
-            f"{m} records for {inputs} inputs: at least {inputs} realisations with different drives are needed."
+            f"{counted(m, 'record')} for {inputs} inputs: at least {inputs} realisations with different drives are "
+            "needed."
         )
     if m == inputs and p < 2:
         raise IdentificationError(
-            f"{m} records of one usable period for {inputs} inputs leave nothing to estimate the confidence from; "
-            "give more realisations or more periods."
+            f"{counted(m, 'record')} of one usable period for {counted(inputs, 'input')} leave{'s' * (m == 1)} nothing "
+            "to estimate the confidence from; give more realisations or more periods."
         )
     lines = _excited_lines(drive, period)
     u, y = drive[:, :, lines].mean(axis=1), output[:, :, lines].mean(axis=1)

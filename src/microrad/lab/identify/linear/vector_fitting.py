@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Complexes, Floats
+from microrad.core.units import counted
 from microrad.lab.identify.linear.modal import Hold, ModalModel, hold_basis, rank_one_modes, real_columns
 from microrad.lab.identify.records import IdentificationError
 
@@ -240,11 +241,14 @@ def check_order(freq: Floats, order: int) -> None:
     Raises:
         IdentificationError: If the number of poles is below 1 or beyond what so many frequencies can fix.
     """
+    if order != int(order):
+        raise IdentificationError(f"the order is {order}; give a whole number of poles.")
     if order < 1:
         raise IdentificationError(f"the order is {order}; give at least one pole.")
     if freq.size < order + 1:
         raise IdentificationError(
-            f"{freq.size} frequencies cannot fix {order} poles; give at least {order + 1} frequencies or a lower order."
+            f"{freq.size} {'frequency' if freq.size == 1 else 'frequencies'} cannot fix {counted(order, 'pole')}; give "
+            f"at least {order + 1} frequencies or a lower order."
         )
 
 

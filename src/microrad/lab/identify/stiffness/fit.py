@@ -164,7 +164,7 @@ def trust(fit: HystereticStiffnessFit, drive: Floats) -> Trust:
     errors = [float(np.sqrt(np.mean(fit.error_rms[classes == c] ** 2))) for c in range(len(fit.amplitudes))]
     power, level = np.polyfit(np.log(fit.amplitudes), np.log(errors), 1)
     amplitude = float(np.sqrt(np.mean(np.var(drive, axis=0))))
-    left = math.exp(level + max(float(power), 0.0) * math.log(amplitude))
+    left = math.exp(level) * amplitude ** max(float(power), 0.0)
     return Trust(float((largest / fit.motion).max()), math.hypot(left, opened), left, opened)
 
 
@@ -406,9 +406,11 @@ def _in_si(numbers: Numbers, moved: Floats, units: tuple[float, float]) -> Float
 def _check(records: Sequence[Recording], skip_periods: int, options: StiffnessOptions) -> None:
     if not records:
         raise IdentificationError("no recording was given; name records of at least two amplitudes.")
+    if skip_periods < 0:
+        raise IdentificationError(f"{skip_periods} periods are to be skipped; skip none or more.")
     for other in records:
         whole = other.samples // other.period_samples if other.period_samples else 0
-        if whole <= max(skip_periods, 0):
+        if whole <= skip_periods:
             raise IdentificationError(
                 f"{other.path}: the record has {whole} whole periods and {skip_periods} are to be skipped; this "
                 "fit needs periodic excitation (multisines) in its steady state: give period_samples, or record more "
