@@ -789,3 +789,10 @@ def test_a_file_is_the_same_however_it_is_spelled(tmp_path, spelled):
     entry = '[recording.{}]\nfile = "{}"\ninput = 1\noutput = 2\n'
     told = faults(tmp_path, entry.format("a", "a.csv") + entry.format("b", name) + 'role = "validation"\n')
     assert "takes samples for validation that [recording.a] fits" in told["recording.b", 5]
+
+
+def test_the_name_of_a_file_that_is_empty_is_said_to_be_so(tmp_path):
+    entry = '[recording.a]\nfile = ""\ninput = "u"\noutput = "y"\n'
+    with pytest.raises(RecordingsError, match="is empty") as refused:
+        read_list(write_list(tmp_path, entry))
+    assert refused.value.faults[0].key == "recording.a.file"

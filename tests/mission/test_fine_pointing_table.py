@@ -335,7 +335,7 @@ ONE_WRONG = [
     ("vibration.rms", '["1 urad"]', 'does not belong to spectrum = "olympus"', 'or spectrum = "bands"'),
     ("vibration.rms", '["0 urad"]', "item 1", "above 0 rad"),
     ("vibration.file", '"a.csv"', 'does not belong to spectrum = "olympus"', 'or spectrum = "table"'),
-    ("vibration.file", '""', "wrong kind", "text in quotes"),
+    ("vibration.file", '""', "is empty", "text in quotes"),
     ("body.error", '"-1 urad"', "below 0 rad", 'error = "5 urad"'),
     ("body.sigmas", "0", "not above 0", "above 0"),
     ("body.bandwidth", '"12.5 kHz"', "not below half of 1 / fine_pointing.plant_step (12.5 kHz)", "would do"),

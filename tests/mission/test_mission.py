@@ -289,7 +289,7 @@ def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
         ("conventions.strehl", '"decibels"', "none of the choices", 'strehl = "decibel" or strehl = "ratio"'),
         ("conventions.strehl", "1", "none of the choices", 'strehl = "decibel"'),
         ("mirror.composition", '"cascaded"', "none of the choices", 'composition = "cascade"'),
-        ("mirror.name", '""', "wrong kind", "text in quotes"),
+        ("mirror.name", '""', "is empty", "text in quotes"),
         ("mirror.name", "7", "wrong kind", "text in quotes"),
         ("mirror.bouc_wen.d1", '"0 mrad/V"', "not above 0 rad/V", "above 0"),
         ("mirror.bouc_wen.d2", '"1 V/s"', "another kind", "s/V"),
@@ -2192,7 +2192,14 @@ ALL_OF_A_FILE = {
     ),
     "a name of nothing": (
         lambda: faults_of(edited("name", '""')),
-        """name = "" is of the wrong kind: text in quotes, for example name = "a name" ()""",
+        """name = "" is empty: text in quotes, for example name = "a name" ()""",
+    ),
+    "a name that is too long": (
+        lambda: faults_of(edited("mirror.name", f'"{"n" * 201}"')),
+        f"""
+        mirror.name = "{"n" * 60}…" has 201 characters: text in quotes, at most 200 characters, for example
+        name = "a name" ()
+        """,
     ),
     "a switch and a count in quotes": (
         lambda: faults_of(edited("point_ahead.corrected", '"true"', edited("acquisition.attempts", '"3"'))),

@@ -582,19 +582,26 @@ class _Report:
             line = _line(location[-1], cause.example)
             self.document.fault(key, shown(value), cause.reason, f"{cause.expected}; for example {line}")
         else:
-            self._note_kind(key, location, value)
+            self._note_kind(key, location, detail)
 
-    def _note_kind(self, key: str, location: _Location, value: object) -> None:
+    def _note_kind(self, key: str, location: _Location, detail: Any) -> None:
+        value = detail["input"]
         if not location:
             self.document.fault(key, shown(value), "is no table", f"[{key}], once, with its keys below it")
             return
         table, name = self._table(location), str(location[-1])
         choices = _choices(table, name)
         nearest = _nearest(value, choices) if isinstance(value, str) else ""
+        wanted, most = _expected(table, name), detail.get("ctx", {}).get("max_length")
         reason = "is none of the choices" if choices else "is of the wrong kind"
+        if value == "" and not choices:
+            reason = "is empty"
+        elif isinstance(value, str) and most is not None:
+            reason = f"has {len(value)} characters"
+            wanted = wanted.replace("text in quotes", f"text in quotes, at most {most} characters", 1)
         if value == UNKNOWN:
             reason = NOT_PUBLISHED
-        self.document.fault(key, shown(value), reason, _expected(table, name), nearest=nearest and f'"{nearest}"')
+        self.document.fault(key, shown(value), reason, wanted, nearest=nearest and f'"{nearest}"')
 
 
 def _line(name: object, example: str) -> str:
