@@ -711,3 +711,9 @@ def test_each_number_of_a_search_has_bounds_of_its_kind(like, low, high):
     ):
         assert own == pytest.approx([*(names[w] if w in names else float(w) for w in words.split()), delay])
     assert problem.pack(like).size == found[0].size
+
+
+def test_an_order_with_a_pole_that_no_recording_shows_is_not_worse_by_a_price():
+    of = [OrderScore(n, n, 10.0 * n, 100, c, 0.0) for n, c in ((1, 50.0), (2, 1e12 + 30.0), (3, 2e12))]
+    assert axis._reason(of[0], of).endswith("noise); order 2 has a pole that no recording shows")
+    assert axis._reason(of[0], [of[0], OrderScore(2, 2, 20.0, 100, 9e11, 0.0)]).endswith("is worse by 900000000000")

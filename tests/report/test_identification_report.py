@@ -1649,3 +1649,10 @@ def test_a_settled_hysteresis_with_a_large_error_has_no_power_of_ten():
     )
     *_, said, _ = parameters.notes(fit)
     assert said.endswith("= 4620 ± 140 µrad.")
+
+
+def test_an_order_with_a_pole_that_no_recording_shows_has_no_criterion():
+    of = {"order": 2, "parameters": 5, "chi_square": 20.0, "freedom": 40, "output_error_rms": 1e-6}
+    score = SimpleNamespace(**of, criterion=1e12 + 30.0)
+    (row,) = identification_page._scan(SimpleNamespace(scan=(score,), order=1)).rows
+    assert row == ("2", "5", "0.5", "", "1 µrad", "has a pole that no recording shows")

@@ -15,7 +15,9 @@ from microrad.core.folder import path_argument, write_whole
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
+from microrad.lab.identify.linear.axis import NOT_SHOWN
 from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.linear.pole_zero import UNSEEN
 from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.recording import Recording
 from microrad.report.identification import parameters, words
@@ -255,9 +257,9 @@ def _scan(linear: LinearFit) -> Table | None:
             str(s.order),
             str(s.parameters),
             plain(s.chi_square / max(s.freedom, 1), 4),
-            plain(s.criterion, 5),
+            plain(s.criterion, 5) if s.criterion < UNSEEN else "",
             f"{plain(s.output_error_rms * 1e6, 4)} µrad",
-            "chosen" if s.order == linear.order else "",
+            "chosen" if s.order == linear.order else "" if s.criterion < UNSEEN else NOT_SHOWN,
         )
         for s in linear.scan
     ]

@@ -18,7 +18,15 @@ from microrad.lab.identify.linear.fit import (
 )
 from microrad.lab.identify.linear.modal import HOLD, Hold, ModalModel, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order
-from microrad.lab.identify.linear.pole_zero import Fitted, PoleZeroProblem, merged, modes_of, pruned, root_values
+from microrad.lab.identify.linear.pole_zero import (
+    UNSEEN,
+    Fitted,
+    PoleZeroProblem,
+    merged,
+    modes_of,
+    pruned,
+    root_values,
+)
 from microrad.lab.identify.linear.response import (
     BANDS,
     FrequencyResponse,
@@ -195,6 +203,9 @@ def _score(fit: Fitted) -> OrderScore:
     return OrderScore(order, fit.parameters, fit.chi_square, fit.freedom, fit.criterion, fit.output_error_rms)
 
 
+NOT_SHOWN = "has a pole that no recording shows"
+
+
 def _reason(chosen: OrderScore, scan: Sequence[OrderScore]) -> str:
     per = ", ".join(f"{s.order}: {plain(s.chi_square / s.freedom)}" for s in scan)
     reason = (
@@ -205,7 +216,8 @@ def _reason(chosen: OrderScore, scan: Sequence[OrderScore]) -> str:
     others = [s for s in scan if s.order != chosen.order]
     if others:
         next_best = min(others, key=lambda s: s.criterion)
-        reason += f"; order {next_best.order} is worse by {plain(next_best.criterion - chosen.criterion)}"
+        worse = f"is worse by {plain(next_best.criterion - chosen.criterion)}"
+        reason += f"; order {next_best.order} {worse if next_best.criterion < UNSEEN else NOT_SHOWN}"
     return reason
 
 

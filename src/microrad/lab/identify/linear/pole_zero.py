@@ -28,7 +28,8 @@ from microrad.lab.identify.statistics import central_differences
 _MOST_LINES = 500
 _SURE = 1e-5  # of a response: the least standard error that counts, for records without noise
 _DAMPING = (1e-4, 0.9999)
-_NONE = 1e12  # price of a pole that a record cannot show, more than any distance
+UNSEEN = 1e12
+"""Price of a pole that a record cannot show, more than any distance."""
 _FLAT = 0.5  # damping from which a slow pair is nothing but creep
 _END = 0.5  # of the band: a zero beyond may stand for a pole
 _GAIN = 1e-3  # of the criterion, at least, so that no change is made twice
@@ -320,7 +321,7 @@ class Fitted:
     def criterion(self) -> float:
         """What is left and the price of the numbers."""
         none = sum(not self.problem.shows(pole) for pole in self.at.poles)
-        return self.chi_square + self.parameters * math.log(self.problem.values) + _NONE * none
+        return self.chi_square + self.parameters * math.log(self.problem.values) + UNSEEN * none
 
     @property
     def output_error_rms(self) -> float:
