@@ -104,7 +104,7 @@ def _parts(of: Any, depth: int) -> Iterator[float]:
     elif isinstance(of, bool | int | float | complex | np.number | np.bool_):
         yield from _array(np.atleast_1d(of)) if isinstance(of, complex) else (_magnitude(_float(of)),)
     elif isinstance(of, str):
-        yield zlib.crc32(_CHANGING.sub("", of).encode()) % 9973 / 997.3
+        yield zlib.crc32(_CHANGING.sub("", of).encode(errors="surrogatepass")) % 9973 / 997.3
     elif isinstance(of, np.ndarray) and of.dtype.kind in "OUS":
         yield from _parts([*of.shape, *of.ravel()[:SPREAD].tolist()], depth + 1)
     elif isinstance(of, np.ndarray):
