@@ -786,3 +786,9 @@ def test_a_number_at_its_bound_or_with_a_large_error_is_told_with_its_unit(value
         Structure("s", parameters, lambda v: None), np.array(values), np.diag(np.array([0.4, 1.0, 0.6]) ** 2)
     )
     assert [f"{name}: {fact}" for name, fact in found] == told
+
+
+@pytest.mark.parametrize("admissible", [False, True])
+def test_an_operator_becomes_no_play_that_no_sample_sees_bend(admissible):
+    alpha = structures._bouc_wen_part(MODEL, (), admissible)[0][2]
+    assert (alpha.name, alpha.lower, alpha.upper) == ("alpha", pytest.approx(5e-4), pytest.approx(15.0))

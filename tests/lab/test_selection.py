@@ -27,6 +27,7 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
+from microrad.lab.identify.hysteresis.alone import STATIC_FORMS
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
 from microrad.lab.identify.records import si_records
 from microrad.lab.identify.selection import candidates, choice, predictions
@@ -34,12 +35,14 @@ from microrad.lab.identify.selection.candidates import refit
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.statistics import correlation, propagated
 from microrad.lab.recording import Recording
+from microrad.lab.recording.reader import recording_from_arrays
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mission.file import load_mirror
 from microrad.report.identification.parameters import parameter_rows
 from places import ROOT
 from truths import behind_resonance, bouc_wen, philox, plays, recorded, small_multisine
+from waiting import no_hang
 
 PAGE = (ROOT / "docs" / "identify.md").read_text(encoding="utf-8")
 RATE = 4000.0
@@ -1267,3 +1270,12 @@ def test_a_line_has_one_slope_for_all_records_and_an_offset_for_each():
 def test_what_is_judged_over_hours_is_told_in_plain_seconds():
     found = predictions.Evidence((("slow.csv", 1234.0), ("fast.csv", 0.5)), "fast.csv", 3e-6, 9e-6)
     assert found.text == "1230 s of 2 recordings, slow.csv (1230 s) and fast.csv (0.5 s)"
+
+
+def test_a_mirror_without_hysteresis_is_identified_in_the_end():
+    """What is left is rounding: a search that follows it to ever stiffer operators never came back."""
+    drive = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(400) / 200.0)
+    recording = recording_from_arrays(np.round(drive, 4), np.round(10.0 * drive, 4), rate_hz=200.0)
+    with no_hang():
+        found = choice.identify([recording], models=STATIC_FORMS, output_unit="urad")
+    assert len(found.scores) + len(found.refused) == len(STATIC_FORMS)

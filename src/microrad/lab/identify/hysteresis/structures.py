@@ -244,7 +244,8 @@ def _bouc_wen_part(
         Parameter(
             "epsilon", "rad/V", model.epsilon_rad_v, size=max(abs(model.epsilon_rad_v), 1e-3 * abs(model.d1_rad_v))
         ),
-        Parameter("alpha", "1/V", model.alpha_1_v, lower=1e-3 * model.alpha_1_v),
+        # Beyond, an operator is a play that no sample sees bend, and each of its steps takes ever longer.
+        Parameter("alpha", "1/V", model.alpha_1_v, 1e-3 * model.alpha_1_v, 30.0 * model.alpha_1_v),
         Parameter("beta over alpha", "", model.beta_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
         Parameter("d2", "s/V", model.d2_s_v, -1.0 / fastest, 1.0 / fastest, 0.01 / fastest),
         Parameter("delta", "s/V", model.delta_s_v, -3.0 / fastest, 10.0 / fastest, 0.1 / fastest),
