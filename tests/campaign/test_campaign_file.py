@@ -607,7 +607,7 @@ def test_a_plain_number_that_would_do_is_shown_without_quotes_and_a_quantity_wit
 
 
 @pytest.mark.parametrize(
-    ("mission", "reason"), [('""', "is of the wrong kind"), ("1", "is of the wrong kind"), (None, "is missing")]
+    ("mission", "reason"), [('""', "is empty"), ("1", "is of the wrong kind"), (None, "is missing")]
 )
 def test_a_campaign_without_the_name_of_its_mission_is_refused_in_one_fault(tmp_path, mission, reason):
     line = "" if mission is None else f"mission = {mission}\n"

@@ -400,7 +400,7 @@ def test_other_things_that_cannot_be(hysteretic_records):
         identify_coupled(hysteretic_records, output_unit="inch")
     with pytest.raises(IdentificationError, match="input unit 'kV' is not known"):
         identify_coupled(hysteretic_records, drive_unit="kV", output_unit="rad")
-    with pytest.raises(IdentificationError, match=r"1 positions for 2 outputs \(x, y\)"):
+    with pytest.raises(IdentificationError, match=r"1 position for 2 outputs \(x, y\)"):
         identify_coupled(hysteretic_records, output_unit="m", positions_m=[(0.0, 1.0)])
     with pytest.raises(IdentificationError, match=r"2 records for 2 actuators: 1 held out .* leave 1, and at least 2"):
         identify_coupled(hysteretic_records[:2], output_unit="rad")
