@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
+from microrad.campaign.rows import importance_sampling as sampling
 from microrad.campaign.rows.importance_sampling import (
     PLAIN,
     Proposal,
@@ -338,3 +340,11 @@ def test_a_loop_without_noise_and_an_unstable_one_are_refused(gaussian, controll
     with pytest.raises(ValueError, match="unstable: a pole at"):
         proposal(gaussian, wild, SPAN, 5e-6)
     assert proposal(replace(gaussian, gauge=None), controller, SPAN, 5e-6).sigma_rad.size == 2
+
+
+def test_what_lines_leave_counts_both_axes(monkeypatch):
+    left = {"wheel": np.array([1e-12, 3e-12]), "noise": np.array([9e-12, 9e-12]), "cooler": np.array([2e-12, 0.0])}
+    monkeypatch.setattr(sampling.linear, "stationary", lambda closed: SimpleNamespace(error_by_source=left))
+    lines = [SimpleNamespace(name=name) for name in ("wheel", "cooler", "wheel")]
+    closed = SimpleNamespace(open=SimpleNamespace(lines=lines))
+    assert sampling._lines_rad(closed) == pytest.approx(np.sqrt(2.0 * 6e-12), rel=1e-12)

@@ -1799,3 +1799,12 @@ def test_a_beam_is_the_same_by_its_tables_and_what_it_passes_through(sky):
     assert beam != evaluate._Beam.of(
         "beacon", SimpleNamespace(**{**vars(shared), "point_ahead_rad": 0.0}), "a table", {}
     )
+
+
+def test_the_time_of_this_sitting_is_noted_when_it_ends():
+    """Thirty seconds of earlier ones, and a second since this one began."""
+    book = Kept()
+    made, _ = rounds_of(book, lambda jobs: iter(()))
+    made.pace.began_s -= 1.0
+    made._note("stopped")
+    assert book.noted["seconds"] >= 31.0 and book.noted["state"] == "stopped"

@@ -380,3 +380,9 @@ def test_a_plan_in_any_form_is_exit_0_where_data_flow(call, folder, monkeypatch,
         assert json.loads(result.out) == {"mission": load_link(path).mission.name, "volume_bit": bit}
     else:
         assert result.out == text
+
+
+@pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
+@pytest.mark.parametrize(("name", "code"), [("no contact", 1), ("a share", 0)])
+def test_the_exit_code_is_that_of_the_relay_in_each_form(call, folder, form, name, code):
+    assert call("contacts", path_of(folder, MISSIONS[name]), *form).code == code

@@ -154,3 +154,12 @@ def test_the_answer_is_the_mean_with_its_half_width_and_where_the_others_meet_th
 @pytest.mark.parametrize(("at", "cost_db"), [(1e-5, 0.0), (1.0000005e-5, 0.0), (0.9e-5, 0.0), (1.1e-5, 0.4139269)])
 def test_errors_that_meet_the_target_cost_nothing(at, cost_db):
     assert coded_residual._cost_db(np.array(falls(0.1, at)), 1e-5) == pytest.approx(cost_db, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("span_s", "length"), [(0.0, 1), (0.02, 20), (0.0196, 20), (0.0204, 20), (0.029, 29), (0.0003, 1)]
+)
+def test_a_window_is_as_many_samples_as_are_nearest_to_the_span(span_s, length):
+    beam = CodedBeam(Light(100e-6, 0.0), 2.75, CODE, 1e-5, "convolutional", span_s)
+    (counted,) = coded_asked(beam, LOOP.parts, SPAN).tallies()
+    assert {each.length for each in counted._windows} == {length}

@@ -250,3 +250,15 @@ def test_a_study_and_a_campaign_leave_it_out_where_it_is_offered(monkeypatch):
     with pytest.raises(LookupError) as study:
         controller_study.design_and_simulate(SimpleNamespace(table=table))
     assert study.value.args == controller_study.names(table) and adaptive_name not in study.value.args
+
+
+def test_each_actuator_expects_its_own_reading(monkeypatch):
+    def expected(loop, actuator):
+        one = np.ones((1, 1))
+        return lti.StateSpace(0.1 * (1 + actuator) * one, one, one, 0.0 * one)
+
+    nominal = loop_of(axes=2)
+    frozen = in_series(nominal)
+    monkeypatch.setattr(fine, "expected_reading", expected)
+    order = frozen.system.order
+    assert_allclose(fine.with_adaptation(frozen, nominal).system.A[order:, order:], np.diag([0.1, 0.2]))

@@ -590,3 +590,8 @@ def test_a_pid_of_several_axes_is_the_same_on_each_and_acts_on_no_other(axes):
 def test_disturbances_in_a_list_are_added_up_as_those_in_a_tuple():
     listed = replace(ALONE, vibration=[HUM, ROLL])
     assert listed.residual_rms_rad(SINGLE) == pytest.approx(ALONE.residual_rms_rad(SINGLE), rel=1e-12)
+
+
+def test_one_row_of_samples_is_no_reference_of_two_axes():
+    with pytest.raises(ValueError, match=re.escape("shape (6, 1): give finite samples of shape (samples, 2)")):
+        ON_TWO.simulate(OF_TWO, 0.1, reference_rad=np.zeros(6))

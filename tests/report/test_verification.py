@@ -3177,3 +3177,12 @@ def test_a_made_mission_has_its_values_in_si_units_and_words_as_they_are(key, va
     assert given(key) == pytest.approx(value) and (given("a.y"), given("a.b.t")) == ("3 of them", "words")
     if unit:
         assert given.unit(key) == unit
+
+
+def test_the_shares_of_ishigamis_function_are_those_that_are_published():
+    """A. Saltelli et al., Global Sensitivity Analysis, Wiley 2008, for a = 7 and b = 0.1."""
+    found = {each.what: each.expected for each in draws._shares(None)}
+    of = {"first": (0.3139, 0.4424, 0.0), "total": (0.5576, 0.4424, 0.2437)}
+    for kind, published in of.items():
+        expected = [found[f"Ishigami's function, input {i + 1}, {kind}"] for i in range(3)]
+        assert expected == pytest.approx(published, abs=5e-5)

@@ -1,6 +1,7 @@
 """A whole run whose fine-pointing loop has a mirror of several axes: residual, budget, stroke, contact, report."""
 
 import math
+import re
 import shutil
 from functools import cache
 from pathlib import Path
@@ -23,6 +24,7 @@ from microrad.mission.file import MissionError, load_loop, load_mission
 from microrad.report.results.reproduce import reproduce
 from microrad.studio.views import controllers
 from microrad.study import study
+from places import ROOT
 from several_axes import TEXT, mission_text, three_actuators
 from shipped import SHIPPED, without_fine_pointing
 
@@ -246,3 +248,12 @@ def test_the_studio_says_where_its_controllers_are(tmp_path):
     alone.write_text(without_fine_pointing(SHIPPED.read_text("utf-8")), "utf-8")
     with pytest.raises(ValueError, match=r"the mission has no table \[fine_pointing\]: microrad init writes one"):
         controllers.controller(load_mission(alone), "PI")
+
+
+def test_a_mirror_of_one_axis_in_an_option_leaves_the_loop_its_own(tmp_path):
+    named, table = load_loop(written(tmp_path))
+    page = (ROOT / "docs" / "mirror-file.md").read_text(encoding="utf-8")
+    (tmp_path / "one.toml").write_text(re.search(r"```toml\n(.*?)```", page, re.DOTALL).group(1), encoding="utf-8")
+    one, kept = load_loop(named.path, tmp_path / "one.toml")
+    assert table is not None and kept == table
+    assert one.mission.mirror != named.mission.mirror
