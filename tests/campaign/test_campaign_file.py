@@ -463,7 +463,7 @@ ADDED = {
         "inputs.scenario.pid_frequencies.0",
         "is no item of scenario.pid_frequencies",
     ),
-    "a precision that is no table": ("precision = 0.05", "precision", "is no table"),
+    "a precision that is no table": ("precision = 0.05", "precision", "is of the wrong kind"),
     "a set that is no table": ("set = 1", "set", "is no table"),
     "a grid that is no table": ('grid = ["5 cm"]', "grid", "is no table"),
     "limits that are no table": ('limits = "3 dB"', "limits", "is no table"),

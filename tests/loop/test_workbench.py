@@ -593,5 +593,5 @@ def test_disturbances_in_a_list_are_added_up_as_those_in_a_tuple():
 
 
 def test_one_row_of_samples_is_no_reference_of_two_axes():
-    with pytest.raises(ValueError, match=re.escape("shape (6, 1): give finite samples of shape (samples, 2)")):
+    with pytest.raises(ValueError, match=re.escape("shape (6,): give finite samples of shape (samples, 2)")):
         ON_TWO.simulate(OF_TWO, 0.1, reference_rad=np.zeros(6))

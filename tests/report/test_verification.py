@@ -3183,6 +3183,6 @@ def test_the_shares_of_ishigamis_function_are_those_that_are_published():
     """A. Saltelli et al., Global Sensitivity Analysis, Wiley 2008, for a = 7 and b = 0.1."""
     found = {each.what: each.expected for each in draws._shares(None)}
     of = {"first": (0.3139, 0.4424, 0.0), "total": (0.5576, 0.4424, 0.2437)}
-    for kind, published in of.items():
+    for kind, shares in of.items():
         expected = [found[f"Ishigami's function, input {i + 1}, {kind}"] for i in range(3)]
-        assert expected == pytest.approx(published, abs=5e-5)
+        assert expected == pytest.approx(shares, abs=5e-5)

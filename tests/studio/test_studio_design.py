@@ -786,7 +786,7 @@ def test_a_cancelled_question_can_be_asked_again_and_an_error_is_kept():
 
     latest.ask("a", refuse)
     state = latest.wait(HANG_S)
-    assert (state.error, state.result) == ("no day; give it an orbit", None)
+    assert (state.error, state.result, state.running) == ("no day; give it an orbit", None, False)
     latest.ask("a", lambda progress: 7)  # it is answered already
     assert latest.wait(HANG_S).error == "no day; give it an orbit"
     latest.cancel()  # nothing is running

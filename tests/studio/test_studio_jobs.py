@@ -1,5 +1,6 @@
 """Jobs of the studio: processes of their own, whose state is read from files alone."""
 
+import errno
 import json
 import os
 import platform
@@ -1186,3 +1187,13 @@ def test_a_command_has_half_a_minute_behind_each_signal_and_a_queue_the_time_of_
     assert (jobs_process.WAITS_S, jobs_process.QUEUE_S, jobs_process._START_S) == ((30.0, 30.0), 360.0, 300.0)
     assert (jobs_process._LOOK_S, jobs_process._NICENESS) == (0.2, 5)
     assert jobs_files.KINDS == ("study", "campaign", "identification", "export")
+
+
+def test_a_list_is_shown_while_the_disk_is_full(studio, tmp_path, monkeypatch):
+    written(studio.folder, arguments=["presets"], cwd=str(tmp_path))
+
+    def full(folder):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(jobs_module, "start_waiting", full)
+    assert [job.state for job in studio.listed()] == ["queued"]

@@ -1356,3 +1356,11 @@ def test_a_dialog_closes_when_its_work_is_done_and_says_why_it_could_not_be(tab)
     assert (shown.value, "no such table" in texts(shown)) == (True, True)
     press(add)
     assert (shown.value, "no such table" in texts(shown)) == (False, False)
+
+
+def test_the_form_leaves_a_table_that_another_mission_does_not_have(opened, session):
+    page = opened()
+    page.form.show("relay")
+    session.change(session.draft.with_text('name = "two"\n[terminals]\nleo_aperture = "5 cm"\n'))
+    page._all()
+    assert page.form.table == next(iter(mission.tables(session.draft)))

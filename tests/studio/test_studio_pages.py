@@ -2454,3 +2454,19 @@ def test_a_browser_has_five_seconds_to_draw(tab, monkeypatch, late):
     monkeypatch.setattr(elements, "stay", asked.append)
     asyncio.run(figure.draw({"data": 1}))
     assert asked == [("draw", ({"data": 1},), 5.0), figure]
+
+
+def test_a_form_that_could_not_be_kept_once_is_kept_again(bench, monkeypatch):
+    kept = []
+    monkeypatch.setattr(layout, "attempt", lambda do: kept.append(do) is None and len(kept) > 1)
+    bench.keep(bench.form)
+    assert bench.kept is False
+    bench.keep(bench.form)
+    assert (bench.kept, len(kept)) == (True, 2)
+
+
+def test_all_that_belongs_to_the_mission_before_is_grey(session, tab, monkeypatch):
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    page = link.LinkPage(session)
+    page.build()
+    assert page.dimmed == (page.cards, page.map, page.key, page.words, page.table)
