@@ -531,7 +531,6 @@ def test_a_larger_margin_and_drives_of_hysteresis_are_data_of_a_design_of_severa
     ("given", "times"),
     [
         ((), [("APE", None, None)]),
-        (("--spacing", "1 min"), [("APE", None, None)]),
         (
             ("--window", "10 ms", "--spacing", "1 min", "--spacing", "2 min"),
             [

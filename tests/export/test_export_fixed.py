@@ -914,3 +914,11 @@ def test_rows_have_each_the_finest_scale_at_which_their_sum_fits():
     weights = 1.0 / 16.0 + 3.0 / 32.0
     assert made.scale == (math.floor(math.log2((2**15 - 1) / weights)), 21, 20)
     assert made.value.tolist() == [[2**17 // 16, -3 * 2**17 // 32], [0, 0], [0, 0]]
+
+
+def test_a_converter_has_the_scale_of_its_own_command(monkeypatch):
+    monkeypatch.setattr(fixed_form, "_output_ranges", lambda of, form, ideal, sizes: np.array([8.0, 0.5]))
+    of, fixed = sixteen_bits()
+    assert fixed.output_scale == (11, 15)
+    for scale, each in zip(fixed.output_scale, fixed.converter, strict=True):
+        assert each.factor * 2.0**-each.shift == pytest.approx(2.0**-scale / of.resolution_v, rel=1e-8)

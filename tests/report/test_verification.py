@@ -3186,3 +3186,14 @@ def test_the_shares_of_ishigamis_function_are_those_that_are_published():
     for kind, shares in of.items():
         expected = [found[f"Ishigami's function, input {i + 1}, {kind}"] for i in range(3)]
         assert expected == pytest.approx(shares, abs=5e-5)
+
+
+def test_a_number_that_is_bare_and_beyond_its_domain_has_both_reasons(monkeypatch):
+    held = {"domains": DOMAINS, "bare": ["A"], "depends": {"A": ["link.range"]}}
+    monkeypatch.setattr(foundation, "shipped", lambda: held)
+    monkeypatch.setattr(marks, "shipped", lambda: held)
+    monkeypatch.setattr(marks, "kind_of", lambda name: "A" if name.endswith("a") else "")
+    of = marks.Marks.of(stated(link__range="50000 km"))
+    (found,) = of.data({"z": {"a": 1.0}})
+    assert (found["sign"], found["beyond"], len(found["because"])) == (marks.BEYOND + marks.BARE, ["link.range"], 2)
+    assert found["because"][-1].startswith("Compared with nothing")
