@@ -591,7 +591,7 @@ def test_parameters_of_a_bouc_wen_model_have_their_bounds_and_sizes():
     assert [(p.name, p.unit, p.start, p.lower, p.upper, p.scale, p.linear) for p in parameters] == [
         ("d1", "rad/V", 3e-5, -np.inf, np.inf, 3e-5, True),
         ("epsilon", "rad/V", -2e-5, -np.inf, np.inf, 2e-5, False),
-        ("alpha", "1/V", 0.5, 5e-4, np.inf, 0.5, False),
+        ("alpha", "1/V", 0.5, 5e-4, 15.0, 0.5, False),
         ("beta over alpha", "", 0.4, -0.999, 0.999, 0.1, False),
         ("d2", "s/V", 1e-6, -1 / 400, 1 / 400, pytest.approx(0.01 / 400), False),
         ("delta", "s/V", -2e-6, pytest.approx(-3 / 400), pytest.approx(10 / 400), pytest.approx(0.1 / 400), False),
