@@ -1060,3 +1060,9 @@ def test_an_order_is_a_whole_number(orders):
 def test_a_whole_number_of_another_type_is_an_order():
     assert fit_module.given_orders(np.arange(1.0, 9.0), [3.0, 2]) == [2, 3]
     assert fit_module.given_orders(np.arange(1.0, 9.0), 3.0) == [3]
+
+
+@pytest.mark.parametrize("order", [float("nan"), float("inf")])
+def test_an_order_that_is_no_number_is_refused(order):
+    with pytest.raises(IdentificationError, match=rf"^the order is {order}; give a whole number of poles\.$"):
+        fit_module.given_orders(np.arange(1.0, 9.0), order)

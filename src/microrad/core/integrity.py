@@ -12,8 +12,8 @@ from pathlib import Path
 _PACKAGE = Path(__file__).resolve().parents[1]
 _PROJECT = _PACKAGE.parents[1]
 _CONSTRAINTS = _PACKAGE / "constraints.txt", _PROJECT / "constraints.txt"
-_MOST_LISTED = 5
 """Where the tested versions stand: in a wheel, and in the project's folder."""
+_MOST_LISTED = 5
 
 
 @dataclass(frozen=True, slots=True)

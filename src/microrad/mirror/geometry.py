@@ -336,8 +336,8 @@ def _usable_travel(travel_rad: float, usable_travel_rad: float | None) -> float:
     if not 0.0 < usable <= travel_rad:
         raise ValueError(
             f"stroke budget: usable_travel_rad is {format_beyond(usable, travel_rad, 'rad')}, of a travel of "
-            f"{format_quantity(travel_rad, 'rad')} from "
-            "stop to stop; give what the drive range leaves of that travel, above 0 rad and not beyond it"
+            f"{format_quantity(travel_rad, 'rad')} from stop to stop; give what the drive range leaves of that travel, "
+            "above 0 rad and not beyond it"
         )
     return usable
 

@@ -592,16 +592,15 @@ class _Report:
         table, name = self._table(location), str(location[-1])
         choices = _choices(table, name)
         nearest = _nearest(value, choices) if isinstance(value, str) else ""
-        wanted, most = _expected(table, name), detail.get("ctx", {}).get("max_length")
+        most = detail.get("ctx", {}).get("max_length") if isinstance(value, str) else None
         reason = "is none of the choices" if choices else "is of the wrong kind"
         if value == "" and not choices:
             reason = "is empty"
-        elif isinstance(value, str) and most is not None:
+        elif most is not None:
             reason = f"has {len(value)} characters"
-            wanted = wanted.replace("text in quotes", f"text in quotes, at most {most} characters", 1)
         if value == UNKNOWN:
             reason = NOT_PUBLISHED
-        self.document.fault(key, shown(value), reason, wanted, nearest=nearest and f'"{nearest}"')
+        self.document.fault(key, shown(value), reason, _expected(table, name, most), nearest=nearest and f'"{nearest}"')
 
 
 def _line(name: object, example: str) -> str:
@@ -649,8 +648,8 @@ def _choices(table: type[Table], key: str) -> tuple[str, ...]:
     return next((get_args(kind) for kind in kinds if get_origin(kind) is Literal), ())
 
 
-def _expected(table: type[Table], key: str) -> str:
-    """What a key of a table may hold, with a line that could stand there."""
+def _expected(table: type[Table], key: str, most: int | None = None) -> str:
+    """What a key of a table may hold, with a line that could stand there; of a text the most characters, if limited."""
     info = _info(table, key)
     rules = [rule for rule in (info.metadata if info else ()) if isinstance(rule, Quantity | Several)]
     if rules:
@@ -660,7 +659,8 @@ def _expected(table: type[Table], key: str) -> str:
     inner = _table_at(table, (key,))
     if inner is not table:
         return f"a table with the keys {', '.join(_keys_of(inner))}"
-    return f'text in quotes, for example {key} = "a name"'
+    limit = "" if most is None else f", at most {most} characters"
+    return f'text in quotes{limit}, for example {key} = "a name"'
 
 
 def _dotted(table: str, location: Iterable[object]) -> str:

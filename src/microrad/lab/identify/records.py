@@ -83,6 +83,7 @@ class Units:
 
 DEFAULT_UNITS = Units()
 ANGLES = tuple(_RADIANS)
+"""Units of an output that needs no lever arm."""
 
 
 @dataclass(frozen=True, eq=False)

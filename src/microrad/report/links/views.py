@@ -460,7 +460,7 @@ def cost_cells(c: Cost) -> list[str]:
 
 def _mbit_s(rate_bit_s: float) -> str:
     """A data rate in Mbit/s, whole from ten of them on and in two digits below."""
-    return plain(1e-6 * rate_bit_s + 0.0, 2) if abs(rate_bit_s) < 1e7 else _fixed(1e-6 * rate_bit_s, 0)
+    return plain(1e-6 * rate_bit_s, 2) if abs(rate_bit_s) < 1e7 else _fixed(1e-6 * rate_bit_s, 0)
 
 
 def _fixed(value: float, decimals: int) -> str:

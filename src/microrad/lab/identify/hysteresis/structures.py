@@ -17,6 +17,7 @@ from microrad.mirror.model import Mirror
 from microrad.mission.tables.mirror import roots_from_damping
 
 _RATIO = 0.999  # of alpha, at most: beyond it h would grow without bound
+_STIFFEST = 30.0  # times the start of alpha: beyond it is a play that no sample sees bend, whose steps take ever longer
 _DAMPING = (1e-4, 0.9999)
 _ALLOWED = 4.0  # standard errors
 _LONGEST = 10.0  # times its start, or the decay of the fastest pole: the longest delay that is searched
@@ -244,8 +245,7 @@ def _bouc_wen_part(
         Parameter(
             "epsilon", "rad/V", model.epsilon_rad_v, size=max(abs(model.epsilon_rad_v), 1e-3 * abs(model.d1_rad_v))
         ),
-        # Beyond, an operator is a play that no sample sees bend, and each of its steps takes ever longer.
-        Parameter("alpha", "1/V", model.alpha_1_v, 1e-3 * model.alpha_1_v, 30.0 * model.alpha_1_v),
+        Parameter("alpha", "1/V", model.alpha_1_v, 1e-3 * model.alpha_1_v, _STIFFEST * model.alpha_1_v),
         Parameter("beta over alpha", "", model.beta_1_v / model.alpha_1_v, -_RATIO, _RATIO, 0.1),
         Parameter("d2", "s/V", model.d2_s_v, -1.0 / fastest, 1.0 / fastest, 0.01 / fastest),
         Parameter("delta", "s/V", model.delta_s_v, -3.0 / fastest, 10.0 / fastest, 0.1 / fastest),

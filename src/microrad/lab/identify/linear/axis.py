@@ -204,6 +204,7 @@ def _score(fit: Fitted) -> OrderScore:
 
 
 NOT_SHOWN = "has a pole that no recording shows"
+"""What is told of an order in place of a criterion that is `UNSEEN` or more."""
 
 
 def _reason(chosen: OrderScore, scan: Sequence[OrderScore]) -> str:

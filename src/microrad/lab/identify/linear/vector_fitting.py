@@ -241,7 +241,7 @@ def check_order(freq: Floats, order: int) -> None:
     Raises:
         IdentificationError: If the number of poles is below 1 or beyond what so many frequencies can fix.
     """
-    if order != int(order):
+    if order % 1 != 0:
         raise IdentificationError(f"the order is {order}; give a whole number of poles.")
     if order < 1:
         raise IdentificationError(f"the order is {order}; give at least one pole.")
