@@ -22,8 +22,10 @@ from microrad.mirror import model as mirror
 from microrad.mirror import summary as mirror_summary
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
-from microrad.mission.file import load_mirror, load_mission
+from microrad.mirror.reading import read_mirror
+from microrad.mission.file import MissionError, load_mirror, load_mission
 from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
+from places import TESTS
 from shipped import SHIPPED, edited
 
 STEP = 20e-6
@@ -1313,4 +1315,16 @@ def test_a_rate_below_one_volt_a_second_is_told_in_digits():
     assert not isinstance(model, mirror_summary.PrandtlIshlinskii)
     assert mirror_summary._admissibility(limited) == (
         "the slope after a reversal stays positive only up to 0.25 V/s before the reversal",
+    )
+
+
+def test_a_mirror_whose_poles_cannot_be_told_apart_is_refused_with_its_file():
+    path = TESTS / "corpus" / "bad" / "mirrors" / "poles-far-from-each-other.toml"
+    with pytest.raises(MissionError) as refused:
+        read_mirror(path)
+    (fault,) = refused.value.faults
+    assert (fault.key, fault.file, fault.expected) == ("linear", str(path), "poles that can be told apart")
+    assert fault.reason == (
+        "the linear part of the mirror: poles nearly coincide: the transfer function has no accurate modal form; give "
+        "poles and pole_dampings in place of numerator and denominator"
     )

@@ -202,11 +202,20 @@ def linear_part(table: mirror_table.LinearPart) -> tuple[lti.StateSpace, float]:
     """Linear part divided by its gain at the normalising frequency, and that gain: magnitude, with the sign of Re.
 
     The gain of the mirror belongs to its hysteresis model; cascading two models with a gain each squares it.
+
+    Raises:
+        ValueError: For coefficients whose poles cannot be told apart.
     """
     if table.numerator is None or table.denominator is None:
         zeros, poles = (np.array(roots, dtype=complex) for roots in table.roots)
         return lti.modal_from_roots(zeros, poles, table.normalise_at_hz), 1.0
-    system = lti.modal_from_polynomials(table.numerator, table.denominator)
+    try:
+        system = lti.modal_from_polynomials(table.numerator, table.denominator)
+    except ValueError as error:
+        raise ValueError(
+            f"the linear part of the mirror: {error}; give poles and pole_dampings in place of numerator and "
+            "denominator"
+        ) from None
     response = complex(lti.frequency_response(system, np.array([table.normalise_at_hz]))[0, 0, 0])
     gain = math.copysign(abs(response), response.real)
     return replace(system, C=system.C / gain), gain

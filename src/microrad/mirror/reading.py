@@ -5,6 +5,7 @@ from pathlib import Path
 from microrad.mirror import coupled
 from microrad.mirror.model import Mirror, from_table
 from microrad.mission.file import holds_several_axes, load_coupled_mirror, load_mirror
+from microrad.mission.toml import Fault, MissionError, clipped
 
 
 def read_mirror(path: str | Path) -> Mirror:
@@ -28,4 +29,9 @@ def read_mirror(path: str | Path) -> Mirror:
     """
     if holds_several_axes(path):
         return coupled.of(load_coupled_mirror(path)).mirror
-    return from_table(load_mirror(path).mirror)
+    table = load_mirror(path).mirror
+    try:
+        return from_table(table)
+    except ValueError as error:
+        fault = Fault("linear", "", 0, str(error), "poles that can be told apart", file=clipped(str(path)))
+        raise MissionError(Path(path), [fault]) from None
