@@ -1279,3 +1279,9 @@ def test_a_mirror_without_hysteresis_is_identified_in_the_end():
     with no_hang():
         found = choice.identify([recording], models=STATIC_FORMS, output_unit="urad")
     assert len(found.scores) + len(found.refused) == len(STATIC_FORMS)
+
+
+def test_no_correlation_is_beyond_one_where_rounding_has_left_a_covariance_without_a_variance():
+    covariance = np.array([[0.0, 1e10, 0.0], [1e10, 4.0, -2.0000000001], [0.0, -2.0000000001, 1.0]])
+    found = correlation(covariance)
+    assert_allclose(found, [[0.0, 1.0, 0.0], [1.0, 1.0, -1.0], [0.0, -1.0, 1.0]])

@@ -63,9 +63,10 @@ def may_be_chance(losses: Sequence[Floats], best: Sequence[Floats]) -> bool:
 
 
 def correlation(covariance: Floats) -> Floats:
-    """Correlation matrix of a covariance: nothing for what does not vary."""
-    deviation = np.sqrt(np.diag(covariance)) + 1e-150
-    return np.asarray(covariance / np.outer(deviation, deviation))
+    """Correlation matrix of a covariance: nothing for what does not vary, and 1 at most in spite of rounding."""
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0)) + 1e-150
+    with np.errstate(over="ignore"):
+        return np.asarray(np.clip(covariance / np.outer(deviation, deviation), -1.0, 1.0))
 
 
 def central_differences(quantity: Callable[[Floats], np.ndarray], at: Floats, steps: Floats) -> np.ndarray:

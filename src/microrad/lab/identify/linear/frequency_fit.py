@@ -29,6 +29,7 @@ from microrad.lab.identify.linear.response_table import ResponseTable, band_hz, 
 from microrad.lab.identify.linear.uncertainty import Natural, Uncertainty, inverse_normal, natural, uncertainty
 from microrad.lab.identify.linear.vector_fitting import VectorFit, sketched, vector_fit
 from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.statistics import correlation
 
 _LARGEST = 24  # orders of a scan
 _NO_BETTER = 6  # orders in a row that gain nothing and end a scan
@@ -184,8 +185,8 @@ class FrequencyResponseFit:
             freq_hz: Frequencies, in Hz, shape (frequencies,).
         """
         centre, numbers = self.response(freq_hz), pack(self.modes, not self.strictly_proper)
-        size = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
+        size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        values, vectors = np.linalg.eigh(correlation(self.covariance))
         turn = centre.conj() / np.maximum(np.abs(centre), 1e-300)
         along, across = np.zeros(centre.shape), np.zeros(centre.shape)
 
