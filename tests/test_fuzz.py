@@ -6,8 +6,9 @@ import signal
 import numpy as np
 import pytest
 
-from fuzzing import run, seeds
+from fuzzing import properties, run, seeds
 from fuzzing.formats import FORMATS
+from preset_files import EXAMPLES, completed
 from waiting import HANG_S
 
 FALLEN = sorted(path for path in seeds.BAD.glob("*/*") if path.is_file())
@@ -92,3 +93,9 @@ def test_a_find_is_kept_and_the_run_goes_on(fake, what, tmp_path):
     assert what in find.what
     assert (tmp_path / "finds" / "fake-1-2.txt").read_text(encoding="utf-8").startswith(find.what)
     assert (tmp_path / "finds" / "fake-1-2.input").exists()
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_each_preset_keeps_what_must_hold(name, tmp_path):
+    """The range of some is typed; that of others follows from an altitude and an elevation."""
+    properties.links(completed(tmp_path, name))

@@ -79,7 +79,8 @@ def links(file: LinkFile) -> None:
     margin = outage.margin_db(data)
     assert math.isclose(margin, budgets[0].margin_db, rel_tol=1e-9, abs_tol=_ROUNDING_DB), "margin: not its budget's"
     own = data.table
-    _falls("distance", margin, data, own.with_value("distance_m", 1.1 * own.distance_m))
+    if own.distance_m is not None:  # else it follows from an altitude and an elevation
+        _falls("distance", margin, data, own.with_value("distance_m", 1.1 * own.distance_m))
     if data.jitter is None:
         error = 1.1 * own.pointing_error_rad + 1e-9
         if data.beam.fall.loss_db(error) < link.DEEPEST_DB:  # further out there are side lobes
