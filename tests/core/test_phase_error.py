@@ -147,3 +147,12 @@ def test_a_floor_is_the_share_of_the_time_beyond_a_quarter_or_an_eighth_of_a_tur
 def test_the_largest_phase_error_of_a_ratio_is_no_larger_than_one_that_is_locked(ratio, two, four):
     assert phase_error.largest_rms_rad(ratio, 1) == pytest.approx(two, rel=1e-6)
     assert phase_error.largest_rms_rad(ratio, 2) == pytest.approx(four, rel=1e-6)
+
+
+def test_where_more_than_the_largest_power_is_needed_there_is_none():
+    """Just above the ratio that is left at any power, the amplitude grows without end."""
+    rms = 0.3
+    least = phase_error.floor(rms, 1)
+    assert math.isfinite(phase_error.amplitude_for(least * 1.5, rms, 1))
+    assert phase_error.amplitude_for(least, rms, 1) == math.inf
+    assert phase_error.amplitude_for(math.nextafter(least, 1.0), rms, 1) == math.inf

@@ -1070,3 +1070,9 @@ def test_roots_keep_their_digits_through_scales_of_many_decades():
     assert matrix_forms.roots([Fraction(7)]).size == 0 and matrix_forms.roots([Fraction(7), Fraction(0)]).tolist() == [
         0j
     ]
+
+
+def test_a_coefficient_that_no_float_holds_is_refused():
+    assert matrix_forms.floats([Fraction(1, 3), Fraction(10**308)]).tolist() == [1 / 3, 1e308]
+    with pytest.raises(ExportError, match="beyond the range of a float; take a slower unit of time, or fewer states"):
+        matrix_forms.floats([Fraction(1), Fraction(10**309)])

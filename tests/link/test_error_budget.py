@@ -3,12 +3,14 @@
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import integrate, optimize, signal, stats
 
 from microrad.core import lti
+from microrad.link.error_budget import assembly
 from microrad.link.error_budget.assembly import judge, requirement_of, source_of, stated
 from microrad.link.error_budget.budget import beyond, budget, shares, total
 from microrad.link.error_budget.contributions import Requirement, _at_its_worst, contribution, contributions
@@ -1366,3 +1368,18 @@ def test_a_refusal_of_a_budget_of_two_axes_is_one_whole_sentence(found, expected
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+def test_a_line_that_the_loop_leaves_is_a_sine_on_each_axis_that_it_shakes(monkeypatch):
+    """Its variance is half the square of its amplitude; an axis at rest gets none, nor does a line that is gone."""
+    left = [("wheel", np.array([8e-12, 0.0])), ("both", np.array([2e-12, 4.5e-12])), ("gone", np.zeros(2))]
+    monkeypatch.setattr(assembly, "windowed_noise", lambda closed, index: {"noise": np.array([1e-12, 3e-12])})
+    monkeypatch.setattr(assembly, "windowed_lines", lambda closed, index: left)
+    closed = SimpleNamespace(controller=SimpleNamespace(name="PI"))
+    found = {each.name: each for each in assembly.loop_contributions(closed, Requirement(ErrorIndex("APE")))}
+    assert {name: len(each.parts) for name, each in found.items()} == {"noise": 1, "wheel": 1, "both": 2}
+    assert {each.kind for each in found.values()} == {"loop"}
+    amplitudes = {name: [abs(part.amplitude[0]).tolist() for part in found[name].parts] for name in ("wheel", "both")}
+    assert amplitudes["wheel"] == [pytest.approx([4e-6, 0.0])]
+    assert amplitudes["both"] == [pytest.approx([2e-6, 0.0]), pytest.approx([0.0, 3e-6])]
+    assert np.diag(found["noise"].parts[0].covariance[0]) == pytest.approx([1e-12, 3e-12])

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from link_files import link_file
+from link_files import link_file, received_with
 from microrad import link
 from microrad.campaign.rows.evaluate import _exposure
 from microrad.link import coupling
@@ -401,3 +402,23 @@ def test_a_beam_that_is_like_another_has_lost_the_margin_at_the_same_error(tmp_p
     like = GaussianFall(found.light.half_angle_rad)
     assert float(like.loss_db(fall.error_rad(found.loss_db))) == pytest.approx(found.loss_db, rel=1e-9)
     assert abs(like.half_angle_rad / fall.half_angle_rad - 1.0) > 1e-3
+
+
+@pytest.mark.promise("link-74")
+def test_the_penalty_without_a_code_counts_the_losses_of_both_ends(tmp_path):
+    """By pairs of errors, and by the receiver's own curve."""
+    receiver = received_with("preamplified dpsk", bit_error_ratio=1e-3)
+    file = with_coupling(tmp_path, FIBRE | {"twin": True}, JITTER, receiver)
+    data, found = link.of(file.mission), link_study.run_link_study(file).under_jitter.uncoded_penalty_db
+    rng = np.random.default_rng(11)
+    x, y = rng.normal(1e-6, 3e-6, (2, 400_000)), rng.normal(0.0, 2e-6, (2, 400_000))
+    sent, received = np.hypot(x, y)
+    end, rate = data.receiving.end, data.table.data_rate_bit_s
+    lost = GaussianFall(data.beam.fall.half_angle_rad).loss_db(sent) + end.loss_db(received) - float(end.loss_db(0.0))
+    needed = float(data.receiver.required_power_w(rate))
+
+    def mean_ratio(penalty_db):
+        return float(np.mean(data.receiver.bit_error_ratio_at(needed * 10.0 ** ((penalty_db - lost) / 10.0), rate)))
+
+    drawn = brentq(lambda each: math.log(mean_ratio(each) / data.receiver.bit_error_ratio), 0.0, 40.0)
+    assert found == pytest.approx(drawn, abs=0.1) and drawn > 1.0

@@ -879,3 +879,16 @@ def test_a_controller_with_a_number_that_is_not_finite_does_not_fit_whichever_ma
         bad = replace(s, **{key: np.where(np.eye(2) > 0, getattr(s, key), math.inf)})
         with pytest.raises(ValueError, match="controller 'X' holds a number that is not finite"):
             whole._misfit(None, control.WholeController("X", bad, np.zeros((2, 2))))
+
+
+def test_a_mirror_without_hysteresis_has_one_plant_for_all_motions():
+    """With it, there is one for small and one for slow motions."""
+    plays = two_axes()
+    m = plays.mirror
+    none = {"E": m.E[:, :0], "F": m.F[:0], "G": m.G[:0], "K": m.K[:, :0], "plays": ()}
+    assert m.bank and m.K.shape[1] == len(m.bank)
+    plain = scene_of(replace(plays, mirror=replace(m, **none), known=None))
+    with_plays = scene_of(replace(plays, known=None))
+    assert (len(with_plays.linear), len(plain.linear)) == (2, 1)
+    found, freq = plain.linear[0].mirror, np.array([1.0, 30.0, 150.0])
+    assert_allclose(found.frequency_response(freq), replace(m, **none).frequency_response(freq), rtol=1e-12)

@@ -1906,3 +1906,10 @@ def test_velocities_beside_a_hole_that_is_not_used_are_not_held_against_it(tmp_p
     times = np.r_[0.0, GRID[GRID >= 3540.0]]
     assert ephemeris(tmp_path, HEAD + segment(times, **usable)).states(4000.0).position_m.shape == (3,)
     no_ephemeris(tmp_path, HEAD + segment(times), "no state vector between")
+
+
+def test_a_csv_file_with_a_cell_beyond_what_csv_takes_is_refused_with_its_line(tmp_path):
+    path = tmp_path / "elements.csv"
+    path.write_text("OBJECT_NAME,OBJECT_ID,EPOCH,A,B,C\nA," + csv.field_size_limit() * "1" + "2\n", encoding="utf-8")
+    with pytest.raises(OrbitError, match=r"elements\.csv, line 2: not CSV \(field larger than field limit"):
+        read_elements(path)

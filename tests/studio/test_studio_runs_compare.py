@@ -1123,3 +1123,9 @@ def test_an_example_at_the_end_of_lines_of_both_kinds_changes_none_of_them(draft
     text = "a = 1\r\nb = 2\n[c]"
     added = with_table(replace(draft, text=text), "channel").text.removeprefix(f"{text}\r\n\r\n")
     assert added.startswith("[channel]\r\n") and added.count("\n") == added.count("\r\n") > 1
+
+
+def test_a_campaign_file_that_cannot_be_looked_at_names_no_mission(session):
+    path = session.folder / "c.toml"
+    path.write_text('mission = "mission.toml"\n', encoding="utf-8")
+    assert runs_view._names_a_mission(path) and not runs_view._names_a_mission(session.folder / "gone.toml")

@@ -973,3 +973,12 @@ ANOTHER = "give another one with --port, or leave --port out for a free one"
 )
 def test_a_port_that_is_not_taken_has_its_whole_words(number, words):
     assert server._unbound("lab", 81, OSError(number, "why")) == words
+
+
+def test_a_host_that_has_no_address_is_refused_with_the_reason(monkeypatch):
+    def unknown(*place, **how):
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)
+    with pytest.raises(server.StudioError, match=r"'no\.such\.host' is no address of this machine: Name or"):
+        server._bound("no.such.host", 8080)
