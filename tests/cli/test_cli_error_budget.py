@@ -140,7 +140,7 @@ SOURCES, REQUIREMENTS = (
             "has two axes, and the sources have 3",
         ),
         ([('axes = "y"', 'axes = "z"')], (), "needs 3 axes, and the sources have 2"),
-        ([("gains = [0.0, 1.0]", "gains = [1.0]")], (), "has 1 items, and others have 2"),
+        ([("gains = [0.0, 1.0]", "gains = [1.0]")], (), "has 1 item, and others have 2"),
         ([('frequency = "0.2 mHz"', 'period = "1 h"')], (), 'is missing, and class = "periodic" needs it'),
         (
             [('index = "APE"', 'index = "PDE"\nwindow = "1 s"\nspacing = "9 s"\nobservation = "9 s"')],

@@ -71,7 +71,7 @@ def test_more_than_three_axes_gaps_and_samples_that_are_no_number_are_refused(tm
     with pytest.raises(RecordingError, match=r"1 gap, about 50 samples lost\. Cut the recording there"):
         read_motion(gap)
     np.save(tmp_path / "nan.npy", np.where(np.arange(COUNT) == 7, np.nan, X))
-    with pytest.raises(RecordingError, match=r"sample 7 of .* is nan, 1 such samples in all; cut out a part"):
+    with pytest.raises(RecordingError, match=r"sample 7 of .* is nan, 1 such sample in all; cut out a part"):
         read_motion(tmp_path / "nan.npy", rate_hz=500.0, unit="urad")
     shaken = csv(tmp_path / "shaken.csv", "time,x (urad)", TIME + 3e-4 * np.sin(40 * np.arange(COUNT)), X)
     with pytest.raises(RecordingError, match=r"the steps scatter by .* resample to a constant step"):

@@ -232,12 +232,12 @@ def test_what_no_recordings_can_be_made_of(tmp_path):
         path, u=U, y=np.where(np.arange(2) == 1, np.where(np.arange(400) == 7, np.nan, 1.0)[:, None, None, None], 1) * Y
     )
     message = refusal(path, "u", "y", rate_hz=RATE_HZ)
-    assert "realisation 0: sample 7 of period 1 of the output, y[0] is nan, 1 such samples" in message
+    assert "realisation 0: sample 7 of period 1 of the output, y[0] is nan, 1 such sample" in message
     later = refusal(path, "u", "y", rate_hz=RATE_HZ, part_s=(0.1, None))  # the file's samples, not the part's
     assert "sample 7 of period 1 of the output, y[0] is nan" in later
     np.savez(path, u=U[..., 0], y=np.where(np.arange(400) == 7, np.nan, 1.0)[:, None, None] * Y[..., 0])
     message = refusal(path, "u", "y", axes=AXES[:3], rate_hz=RATE_HZ)
-    assert "realisation 0: sample 7 of the output, y[0] is nan, 1 such samples" in message
+    assert "realisation 0: sample 7 of the output, y[0] is nan, 1 such sample" in message
     text = tmp_path / "a.csv"
     text.write_text("u,y\n" + "1,2\n" * 300)
     assert "--axes (axes) is for arrays (NPY, NPZ, MAT, HDF5) and this file holds columns" in refusal(text, "u", "y")

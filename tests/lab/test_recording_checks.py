@@ -348,9 +348,9 @@ def test_no_data_are_given_twice_nor_fitted_and_for_validation():
 def test_recordings_of_other_channels_are_not_put_together():
     one = recording_from_arrays(SINE, GOOD, RATE_HZ, "one")
     two = recording_from_arrays(SINE, np.column_stack((GOOD, GOOD + SINE)), RATE_HZ, "two")
-    with pytest.raises(RecordingError, match="two: 1 inputs and 2 outputs, where one has 1 and 1; name the same chan"):
+    with pytest.raises(RecordingError, match="two: 1 input and 2 outputs, where one has 1 and 1; name the same chan"):
         check_together([one, two])
-    with pytest.raises(RecordingError, match="two: 1 inputs and 2 outputs"):
+    with pytest.raises(RecordingError, match="two: 1 input and 2 outputs"):
         check_together([one], [two])
 
 
@@ -907,7 +907,7 @@ def with_samples(values, **changes):
         (
             (BOTH[0], with_samples(BOTH[1], _3999=-math.inf)),
             BOTH,
-            "sample 3999 of the drive 1 is -inf, 1 such samples in all; remove or repair it, because hysteresis "
+            "sample 3999 of the drive 1 is -inf, 1 such sample in all; remove or repair it, because hysteresis "
             "remembers what happened in a gap.",
         ),
         (

@@ -962,7 +962,7 @@ def test_nan_in_an_array(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, drive=DRIVE, output=np.where(np.arange(N) == 77, np.nan, OUTPUT))
     message = refusal(path, "drive", "output", RATE_HZ)
-    assert "sample 77 of the output, channel 1 ('output') is nan, 1 such samples" in message
+    assert "sample 77 of the output, channel 1 ('output') is nan, 1 such sample" in message
 
 
 # ---------------------------------------------------------------------------------------------------------------- HDF5

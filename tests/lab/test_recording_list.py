@@ -306,12 +306,12 @@ def test_what_a_check_finds_can_be_taken_on_in_a_list(tmp_path, axes):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ('positions = [["0 mm", "1 mm"], ["0 mm", "2 mm"]]', "positions has 2 places and there are 1 outputs, y; give"),
+        ('positions = [["0 mm", "1 mm"], ["0 mm", "2 mm"]]', "positions has 2 places and there are 1 output, y; give"),
         (
             "signs = [[1], [1]]",
-            "signs has rows of 1, 1 items and there are 1 outputs and 1 inputs; give a row for each",
+            "signs has rows of 1, 1 items and there are 1 output and 1 input; give a row for each",
         ),
-        ("signs = [[1, 1]]", "signs has rows of 2 items and there are 1 outputs and 1 inputs; give a row for each"),
+        ("signs = [[1, 1]]", "signs has rows of 2 items and there are 1 output and 1 input; give a row for each"),
     ],
 )
 def test_places_and_signs_are_as_many_as_the_channels_of_a_single_axis(tmp_path, line, words):
@@ -373,7 +373,7 @@ def test_what_the_recordings_contradict(tmp_path):
     assert "[recording.a]: " in refusal(tmp_path, f'{start}{entry}to = "0.9 s"\n')
     assert "no input column is named 'ux'" in refusal(tmp_path, f'{start}{entry}input = "ux"\n')
     message = refusal(tmp_path, f'input = [1, 2]\noutput = [3, 4]\n{entry}[recording.b]\nfile = "a.csv"\noutput = 3\n')
-    assert "2 inputs and 1 outputs, where" in message
+    assert "2 inputs and 1 output, where" in message
 
 
 @pytest.mark.promise("recordings-20", "recordings-21", "recordings-31")

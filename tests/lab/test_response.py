@@ -214,7 +214,7 @@ def test_records_that_do_not_belong_together():
         ),
         (
             recording(np.stack((u, u), axis=1), u, name="second"),
-            "second: 2 inputs and 1 outputs, where first has 1 and 1",
+            "second: 2 inputs and 1 output, where first has 1 and 1",
         ),
     ):
         for function in (response_from_records, response_from_periods):
@@ -323,7 +323,7 @@ def test_the_third_record_may_differ_in_its_rate_or_in_the_number_of_its_outputs
         "c: the sample rate is 640.5 Hz and that of a 640 Hz; records that are judged together must share one rate."
     )
     assert told(response.check_alike, [first, second, drawn(40, 2, 1, 3, name="c")], "judged") == (
-        "c: 2 inputs and 1 outputs, where a has 2 and 3; choose the same channels in each record."
+        "c: 2 inputs and 1 output, where a has 2 and 3; choose the same channels in each record."
     )
     assert response.check_alike([first, second], "judged") is None
 
@@ -546,7 +546,7 @@ def test_bands_are_logarithmic_within_the_lines_that_there_are(low, high, bands,
         (
             lambda: [drawn(300, k, 1, k, name=f"r{k}") for k in (2, 1)],
             {},
-            "r1: 1 inputs and 1 outputs, where r2 has 2 and 1; choose the same channels in each record.",
+            "r1: 1 input and 1 output, where r2 has 2 and 1; choose the same channels in each record.",
         ),
         (
             lambda: [replace(drawn(300, 1, 1, 1), drive=np.full((300, 1), 3.0))],

@@ -948,7 +948,7 @@ def test_one_amplitude_is_refused(training):
     [
         ({"rate_hz": 2000.0}, r"0\.6 V, 10: the sample rate is 2000 Hz and that of 0\.3 V, 0 1000 Hz"),
         ({"period_samples": None}, r"0\.6 V, 10: the record has 0 whole periods .*period_samples"),
-        ({"output": np.zeros((1024, 1))}, r"0\.6 V, 10: 2 inputs and 1 outputs, where 0\.3 V, 0 has 2 and 2"),
+        ({"output": np.zeros((1024, 1))}, r"0\.6 V, 10: 2 inputs and 1 output, where 0\.3 V, 0 has 2 and 2"),
         ({"drive": np.zeros((1024, 2))}, r"0\.6 V, 10: the drive does not change; excite"),
     ],
 )
@@ -973,7 +973,7 @@ def test_other_arguments_that_cannot_be(training, known):
         fit_hysteretic_stiffness(training, options=StiffnessOptions(sub_steps=0))
     with pytest.raises(IdentificationError, match=r"at 2000 Hz, where the model has 2 and 2 at 1000 Hz"):
         predicted_error(known[0], replace(training[0], rate_hz=2000.0))
-    with pytest.raises(IdentificationError, match=r"0: 2 inputs and 1 outputs at 1000 Hz, where the model has 2 and 2"):
+    with pytest.raises(IdentificationError, match=r"0: 2 inputs and 1 output at 1000 Hz, where the model has 2 and 2"):
         predicted_error(known[0], replace(training[0], output=training[0].output[:, :1]))
 
 
@@ -1492,8 +1492,8 @@ def test_numbers_are_named_in_the_order_of_their_vector(numbers):
     [
         (2, 3, 400.0, "2 inputs and 3 outputs at 400 Hz"),
         (3, 2, 400.0, "3 inputs and 2 outputs at 400 Hz"),
-        (2, 1, 400.5, "2 inputs and 1 outputs at 400.5 Hz"),
-        (1, 1, 400.0, "1 inputs and 1 outputs at 400 Hz"),
+        (2, 1, 400.5, "2 inputs and 1 output at 400.5 Hz"),
+        (1, 1, 400.0, "1 input and 1 output at 400 Hz"),
     ],
 )
 def test_a_record_of_other_channels_or_rate_is_not_predicted(inputs, outputs, rate_hz, told):

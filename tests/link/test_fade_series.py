@@ -334,7 +334,7 @@ def test_levels_and_normalisations():
         (
             np.r_[np.ones(300), -0.1],
             {},
-            'sample 300 is -0.1, and 1 such samples .* \\(unit "dB" if these are levels\\)',
+            'sample 300 is -0.1, 1 such sample .* \\(unit "dB" if these are levels\\)',
         ),
         (np.r_[np.ones(300), np.nan], {}, "sample 300 is nan, .* finite, 0 or above and at most"),
         (np.r_[np.ones(300), 1e31], {}, r"sample 300 is 1e\+31, .* at most 1e\+30"),
@@ -658,13 +658,13 @@ def test_an_interval_is_told_from_sixteen_parts_or_more(count, each, left):
      "(samples,)."),
     (lambda: series_of(np.ones(199)), "series: the series has 199 samples; from 200 to 2000000 are taken: give a "
      "longer one."),
-    (lambda: series_of(np.r_[np.ones(250), -3.5, np.inf, -1.0]), "series: sample 250 is -3.5, and 3 such samples are "
-     'in it: a power must be finite, 0 or above and at most 1e+30 (unit "dB" if these are levels); cut out a part '
+    (lambda: series_of(np.r_[np.ones(250), -3.5, np.inf, -1.0]), "series: sample 250 is -3.5, 3 such samples in "
+     'all: a power must be finite, 0 or above and at most 1e+30 (unit "dB" if these are levels); cut out a part '
      "without them."),
-    (lambda: series_of(np.r_[np.ones(250), np.inf, -1.0]), "series: sample 250 is inf, and 2 such samples are in it: "
+    (lambda: series_of(np.r_[np.ones(250), np.inf, -1.0]), "series: sample 250 is inf, 2 such samples in all: "
      "a power must be finite, 0 or above and at most 1e+30; cut out a part without them."),
     (lambda: series_of(np.r_[np.zeros(250), np.nan, -np.inf, 301.0, -5.0], unit="dB"), "series: sample 250 is nan, "
-     "and 2 such samples are in it: a power must be a number up to 300 dB; cut out a part without them."),
+     "2 such samples in all: a power must be a number up to 300 dB; cut out a part without them."),
     (lambda: series_of(np.zeros(200)), "series: no sample is above 0: there is no light in the series; name another "
      "one."),
     (lambda: series_of(np.tile([1.0, 1.0, 0.1], 100), normalised="largest").resolves(0.5), "series: the series is "
@@ -684,7 +684,7 @@ def test_a_refusal_of_a_series_is_one_whole_sentence(call, words):
      "is 'dB'; give the one that the file says, or correct it."),
     ("power\n" + "1\n" * 300, {"period_s": None}, "NAME: the file does not say how fast it was sampled; give the time "
      "between two samples (sampling, period_s), or a column of times."),
-    ("power\n" + "1\n" * 250 + "-2\n", {"name": "Ours"}, "Ours: sample 250 is -2, and 1 such samples are in it: a "
+    ("power\n" + "1\n" * 250 + "-2\n", {"name": "Ours"}, "Ours: sample 250 is -2, 1 such sample in all: a "
      'power must be finite, 0 or above and at most 1e+30 (unit "dB" if these are levels); cut out a part without '
      "them."),
 ])  # fmt: skip
@@ -785,19 +785,19 @@ def test_a_series_at_its_edges_has_these_numbers(found, expected):
     (lambda: flat_of([0.0, 0.0], "mean"),
      "flat: no sample is above 0: there is no light in the series; name another one."),
     (lambda: flat_of([1.0, -2.0], "mean"),
-     "flat: sample 100 is -2, and 100 such samples are in it: a power must be finite, 0 or above and at most "
+     "flat: sample 100 is -2, 100 such samples in all: a power must be finite, 0 or above and at most "
      '1e+30 (unit "dB" if these are levels); cut out a part without them.'),
     (lambda: flat_of([1.0, 301.0], "mean", unit="dB"),
-     "flat: sample 100 is 301, and 100 such samples are in it: a power must be a number up to 300 dB; cut out "
+     "flat: sample 100 is 301, 100 such samples in all: a power must be a number up to 300 dB; cut out "
      "a part without them."),
     (lambda: flat_of([1.0, 2e30], "mean"),
-     "flat: sample 100 is 2e+30, and 100 such samples are in it: a power must be finite, 0 or above and at most "
+     "flat: sample 100 is 2e+30, 100 such samples in all: a power must be finite, 0 or above and at most "
      "1e+30; cut out a part without them."),
     (lambda: flat_of([1.0, 2.0], "median"),
      "flat: the normalisation is 'median'; give one of mean, largest, as-given."),
     (lambda: flat_of([1.0, 2.0], "mean", unit="W"), "flat: the unit is 'W'; give one of linear, dB."),
     (lambda: flat_of([math.nan, 2.0], "mean", unit="dB"),
-     "flat: sample 0 is nan, and 100 such samples are in it: a power must be a number up to 300 dB; cut out "
+     "flat: sample 0 is nan, 100 such samples in all: a power must be a number up to 300 dB; cut out "
      "a part without them."),
     (lambda: FadeSeries.of(np.ones((100, 2)), 1.0, "s", unit="dB", normalised="mean"),
      "s: the powers have the shape (100, 2); give one series, of shape (samples,)."),

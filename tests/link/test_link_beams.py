@@ -528,3 +528,12 @@ def test_a_refusal_of_a_beam_or_a_gain_is_one_whole_sentence(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+@pytest.mark.parametrize("loss", [30.0, 56.0, 58.0, 150.0, 250.0])
+def test_a_beam_that_the_aperture_hardly_cuts_falls_as_a_gaussian_far_below_its_first_lobe(loss):
+    """The errors looked at come in parts: 57 dB is where the second one begins."""
+    shape = LitAperture(0.1, 1e-6, 6.0, 0.0, 1.0)
+    expected = GaussianFall(shape.half_angle_rad).error_rad(loss)
+    assert shape.error_rad(loss) == pytest.approx(expected, rel=1e-4)
+    assert float(shape.loss_db(shape.error_rad(loss))) == pytest.approx(loss, abs=0.01)

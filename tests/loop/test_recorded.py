@@ -418,7 +418,7 @@ def test_a_filter_of_a_chosen_order_has_so_many_states(small):
     [
         (np.zeros((300, 2)), 1e-3, r"has the shape \(300, 2\): give one row of 200 samples or more"),
         (np.arange(199.0), 1e-3, r"has the shape \(199,\)"),
-        (np.append(np.arange(300.0), np.nan), 1e-3, "sample 300 is nan, 1 such samples in all; cut the recording"),
+        (np.append(np.arange(300.0), np.nan), 1e-3, "sample 300 is nan, 1 such sample in all; cut the recording"),
         (np.full(300, 2e-6), 1e-3, "stands still at 2e-06 rad; name a channel that moves"),
         (np.arange(300.0), 0.0, 'the step of "jitter" is 0 s'),
     ],
@@ -478,7 +478,7 @@ MOVING = np.sin(0.37 * np.arange(400.0)) + 0.01 * np.arange(400.0)
             lambda: recorded_motion(np.where(np.arange(400) == 37, -np.inf, MOVING), 1e-3, "tracker"),
             ValueError,
             (
-                '"tracker": sample 37 is -inf, 1 such samples in all; cut the recording to a part without '
+                '"tracker": sample 37 is -inf, 1 such sample in all; cut the recording to a part without '
                 "them: a gap that is filled in is no motion that was measured"
             ),
         ),

@@ -1089,7 +1089,7 @@ ALL_OF_SEVERAL_AXES = {
             correlation=(0.5, 0.25),
         ).problems(),
         """
-        standard_errors has 1 items where parameters has 3: expected one standard error for each parameter;
+        standard_errors has 1 item where parameters has 3: expected one standard error for each parameter;
         correlation stands beside factor: expected one of the two removed; factor row 2 has the length 1.06066, so
         the correlation with itself is not 1; 2 of 3 rows have another length than 1: expected rows of length 1;
         correlation has 2 items where 3 parameters have 3 pairs: expected 3 numbers, the lower triangle without the
@@ -1287,5 +1287,5 @@ def test_correlations_of_three_parameters_are_three_or_none(items, told):
         correlation=(0.25,) * items,
     )
     found = [(each.key, each.reason, each.expected) for each in table.problems()]
-    wanted = ("correlation", f"has {items} items where 3 parameters have 3 pairs")
+    wanted = ("correlation", f"has {items} item{'s' * (items != 1)} where 3 parameters have 3 pairs")
     assert found == ([(*wanted, "3 numbers, the lower triangle without the diagonal, or none")] if told else [])

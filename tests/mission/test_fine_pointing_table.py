@@ -201,7 +201,7 @@ def test_a_misalignment_has_an_offset_and_a_drift_about_each_axis(load, refuse):
     assert (found.offset_rad, found.drift_rad_s) == (pytest.approx((20e-6, -5e-6)), pytest.approx((1e-7, 0.0)))
     for key, item in (("offset", '"-5 urad"'), ("drift", '"0 urad/s"')):
         fault = refuse(text.replace(f", {item}]", "]"))
-        assert (fault.key, fault.reason) == (f"fine_pointing.misalignment.{key}", "has 1 items")
+        assert (fault.key, fault.reason) == (f"fine_pointing.misalignment.{key}", "has 1 item")
         assert fault.expected.startswith("two, for x and y")
     assert refuse(text.replace('"0.1 urad/s"', '"0.1 urad"')).key == "fine_pointing.misalignment.drift"
 
@@ -736,7 +736,7 @@ ALL_OF_A_LOOP = {
     "a misalignment about three axes and one": (
         lambda: made(MisalignmentTable, offset_rad=(0.0, 0.0, 0.0), drift_rad_s=(0.0,)).problems(),
         """
-        offset has 3 items: expected two, for x and y: offset = ["1 urad", "1 urad"]; drift has 1 items: expected
+        offset has 3 items: expected two, for x and y: offset = ["1 urad", "1 urad"]; drift has 1 item: expected
         two, for x and y: drift = ["1 urad/s", "1 urad/s"]
         """,
     ),

@@ -609,7 +609,7 @@ ALL_OF_A_LINK = {
     "a jitter about one axis and three": (
         lambda: made(JitterTable, bias_rad=(1e-6,), rms_rad=(1e-6, 2e-6, 3e-6)).problems(),
         """
-        bias has 1 items: expected two, for x and y: bias = ["1 urad", "1 urad"]; rms has 3 items: expected two, for
+        bias has 1 item: expected two, for x and y: bias = ["1 urad", "1 urad"]; rms has 3 items: expected two, for
         x and y: rms = ["1 urad", "1 urad"]
         """,
     ),

@@ -1393,7 +1393,7 @@ ALL_OF_A_MIRROR = {
     ),
     "creep of one weight": (
         lambda: made(CreepTable, time_constants_s=(0.5, 1.0, 2.0), weights_rad_v=(1e-6,)).problems(),
-        """weights has 1 items where time_constants has 3: expected one weight for each time constant""",
+        """weights has 1 item where time_constants has 3: expected one weight for each time constant""",
     ),
     "a comparison with two models": (
         lambda: made(Comparison, bouc_wen=0, prandtl_ishlinskii=0).problems(),

@@ -238,7 +238,7 @@ ALL_OF_A_BUDGET = {
             },
         ).problems(),
         """
-        sources.b.gains has 1 items, and others have 3: expected as many each; sources.c.gains has 2 items, and
+        sources.b.gains has 1 item, and others have 3: expected as many each; sources.c.gains has 2 items, and
         others have 3: expected as many each; requirements.q.index is of what is known, and the loop leaves errors
         of the pointing: expected with_loop = false, and sources of knowledge alone; with_loop has two axes, and the
         sources have 3: expected gains for x and y

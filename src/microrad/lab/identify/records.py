@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.errors import MicroradError
+from microrad.core.units import counted
 from microrad.lab.recording import Recording
 
 
@@ -159,8 +160,9 @@ def si_records(recordings: Sequence[Recording], units: Units) -> tuple[SiRecord,
 def _si_record(recording: Recording, units: Units) -> SiRecord:
     if recording.drive.shape[1] != 1 or recording.output.shape[1] != 1:
         raise IdentificationError(
-            f"{recording.path}: {recording.drive.shape[1]} drives and {recording.output.shape[1]} outputs; one of each "
-            "is identified here: choose one column, or identify all of them with coupled.identify_coupled."
+            f"{recording.path}: {counted(recording.drive.shape[1], 'drive')} and "
+            f"{counted(recording.output.shape[1], 'output')}; one of each is identified here: choose one column, or "
+            "identify all of them with coupled.identify_coupled."
         )
     drive = recording.drive[:, 0] * units.volts
     if np.ptp(drive) == 0 or np.ptp(recording.output) == 0:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator
 
-from microrad.core.units import UnitError
+from microrad.core.units import UnitError, counted
 from microrad.lab.recording.checks.together import check_together
 from microrad.lab.recording.reader import Column, read_recording
 from microrad.lab.recording.realisations import AXES, read_arrays
@@ -315,11 +315,12 @@ def _check_channels(
             check_together(recordings, validation)
     if root.positions is not None and len(root.positions) != outputs:
         raise RecordingError(
-            f"{path}: positions has {len(root.positions)} places and there are {outputs} outputs, "
+            f"{path}: positions has {len(root.positions)} places and there are {counted(outputs, 'output')}, "
             f"{', '.join(recordings[0].output_names)}; give one place for each, in their order."
         )
     if root.signs is not None and [len(row) for row in root.signs] != [inputs] * outputs:
         raise RecordingError(
-            f"{path}: signs has rows of {', '.join(str(len(row)) for row in root.signs)} items and there are {outputs} "
-            f"outputs and {inputs} inputs; give a row for each output, with an item for each input."
+            f"{path}: signs has rows of {', '.join(str(len(row)) for row in root.signs)} items and there are "
+            f"{counted(outputs, 'output')} and {counted(inputs, 'input')}; give a row for "
+            "each output, with an item for each input."
         )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats, reals
-from microrad.core.units import parse_quantity
+from microrad.core.units import counted, parse_quantity
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
@@ -226,8 +226,9 @@ def read_motion(
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
             raise RecordingError(
-                f"{path}: {source.place(int(bad[0]))} of {source.label(index)} is {column[bad[0]]}, {bad.size} such "
-                "samples in all; cut out a part without them: what is filled in was not measured."
+                f"{path}: {source.place(int(bad[0]))} of {source.label(index)} is "
+                f"{column[bad[0]]}, {counted(bad.size, 'such sample')} in all; cut out a part without them: what is "
+                "filled in was not measured."
             )
     names = tuple(source.names[index] for index in used)
     return Motion(str(path), source.sha256, names, _table(columns) * np.array(scales), rate)

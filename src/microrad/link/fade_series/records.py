@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats, reals
 from microrad.core.errors import MicroradError
-from microrad.core.units import format_limit, format_quantity
+from microrad.core.units import counted, format_limit, format_quantity
 from microrad.mission.fields import Quantity
 
 Unit = Literal["linear", "dB"]
@@ -196,8 +196,8 @@ def _linear(given: Floats, source: str, unit: Unit) -> Floats:
         wanted = f"finite, 0 or above and at most {_MOST:g}" if unit == "linear" else f"a number up to {_MOST_DB:g} dB"
         hint = ' (unit "dB" if these are levels)' if unit == "linear" and given[row] < 0.0 else ""
         raise FadeSeriesError(
-            f"{source}: sample {row} is {given[row]:g}, and {int(np.sum(bad))} such samples are in it: a power must be "
-            f"{wanted}{hint}; cut out a part without them."
+            f"{source}: sample {row} is {given[row]:g}, {counted(int(np.sum(bad)), 'such sample')} in all: a power "
+            f"must be {wanted}{hint}; cut out a part without them."
         )
     linear: Floats = given.copy() if unit == "linear" else 10.0 ** (given / 10.0)
     if not np.any(linear > 0.0):

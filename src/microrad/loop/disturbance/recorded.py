@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats, reals
+from microrad.core.units import counted
 from microrad.loop.disturbance.records import above_zero
 
 PASSED = 0.9
@@ -82,8 +83,8 @@ def recorded_motion(samples_rad: ArrayLike, step_s: float, name: str = "recordin
     bad = np.flatnonzero(~np.isfinite(samples))
     if bad.size:
         raise ValueError(
-            f'"{name}": sample {bad[0]} is {samples[bad[0]]}, {bad.size} such samples in all; cut the recording to a '
-            "part without them: a gap that is filled in is no motion that was measured"
+            f'"{name}": sample {bad[0]} is {samples[bad[0]]}, {counted(bad.size, "such sample")} in all; cut the '
+            "recording to a part without them: a gap that is filled in is no motion that was measured"
         )
     if np.ptp(samples) <= 1e-12 * float(np.max(np.abs(samples))):
         raise ValueError(f'"{name}" stands still at {samples[0]:g} rad; name a channel that moves')

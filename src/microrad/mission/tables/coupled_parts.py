@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from microrad.core.units import format_input, format_limit
+from microrad.core.units import counted, format_input, format_limit
 from microrad.mission.fields import Problem, ProblemsError, Quantity, Several, Table, Whole
 from microrad.mission.tables.mirror import INDEFINITE, Frequency, KeyList, Name, Rate, Voltage, least_alpha_1_v
 
@@ -153,7 +153,7 @@ class ModesTable(Table):
                     "decay", f"item {place} is {decay:g} 1/s: an unstable mode, which does not die out", "above 0 1/s"
                 )
         if len(self.frequency_rad_s) != len(self.decay_1_s):
-            counts = f"has {len(self.frequency_rad_s)} items where decay has {len(self.decay_1_s)}"
+            counts = f"has {counted(len(self.frequency_rad_s), 'item')} where decay has {len(self.decay_1_s)}"
             yield Problem("frequency", counts, 'one for each mode, "0 rad/s" for a real one')
 
     @property
@@ -258,13 +258,13 @@ class HysteresisTable(Table):
         if self.thresholds_v is None or self.weights is None:
             return
         if len(self.weights) != len(self.thresholds_v):
-            counts = f"has {len(self.weights)} items where thresholds has {len(self.thresholds_v)}"
+            counts = f"has {counted(len(self.weights), 'item')} where thresholds has {len(self.thresholds_v)}"
             yield Problem("weights", counts, "one weight for each threshold")
         if not any((*self.weights, *(self.polynomial or ()))):
             advice = "a weight other than 0, or a polynomial beside them"
             yield Problem("weights", "is zero throughout, so the element acts on nothing", advice)
         if self.polynomial is not None and len(self.polynomial) != 3:
-            counts = f"has {len(self.polynomial)} items"
+            counts = f"has {counted(len(self.polynomial), 'item')}"
             yield Problem("polynomial", counts, "three: of s^2, of |s| s and of s^3, such as [0.0, 0.01, -0.02]")
         if (self.polynomial is None) != (self.reach_v is None):
             there, missing = ("polynomial", "reach") if self.reach_v is None else ("reach", "polynomial")
@@ -319,7 +319,7 @@ class UncertaintyTable(Table):
         """Counts that fit, and a correlation that is one."""
         count = len(self.parameters)
         if len(self.standard_errors) != count:
-            found = f"has {len(self.standard_errors)} items where parameters has {count}"
+            found = f"has {counted(len(self.standard_errors), 'item')} where parameters has {count}"
             yield Problem("standard_errors", found, "one standard error for each parameter")
         if self.factor is not None and self.correlation is not None:
             yield Problem("correlation", "stands beside factor", "one of the two removed")
@@ -342,7 +342,7 @@ class UncertaintyTable(Table):
 
         pairs = count * (count - 1) // 2
         if len(correlation) != pairs:
-            found = f"has {len(correlation)} items where {count} parameters have {pairs} pairs"
+            found = f"has {counted(len(correlation), 'item')} where {count} parameters have {pairs} pairs"
             yield Problem("correlation", found, f"{pairs} numbers, the lower triangle without the diagonal, or none")
         elif (least := float(np.linalg.eigvalsh(self.correlation_matrix)[0])) < -INDEFINITE:
             found = f"is not positive semidefinite: its smallest eigenvalue is {least:.3g}"

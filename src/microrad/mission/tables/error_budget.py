@@ -5,6 +5,7 @@ from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
+from microrad.core.units import counted
 from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table
 from microrad.mission.tables.mirror import ANGLE_MOST, Frequency, Name
 from microrad.mission.tables.pointing import AngleOrZero, Statistic
@@ -65,7 +66,7 @@ class BudgetSource(Table):
         """The keys of the class, and no others; one to three axes; a noise that is stated by its deviation."""
         yield from self.choice_problems(f'class = "{self.kind}"', _NEEDED[self.kind])
         if not 1 <= len(self.gains) <= MOST_AXES:
-            yield Problem("gains", f"has {len(self.gains)} items", "one for each axis: gains = [1.0, 1.0]")
+            yield Problem("gains", f"has {counted(len(self.gains), 'item')}", "one for each axis: gains = [1.0, 1.0]")
         if self.kind == "per-observation" and self.statistic == "fixed":
             yield Problem(
                 "statistic", "leaves no other one in the next observation", 'class = "constant", or how it is spread'
@@ -143,7 +144,7 @@ class ErrorBudget(Table):
             if len(source.gains) != self.axes:
                 yield Problem(
                     f"sources.{name}.gains",
-                    f"has {len(source.gains)} items, and others have {self.axes}",
+                    f"has {counted(len(source.gains), 'item')}, and others have {self.axes}",
                     "as many each",
                 )
         known = [name for name, each in self.requirements.items() if each.index in ("AKE", "MKE", "RKE")]

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.core.units import format_limit, format_quantity
+from microrad.core.units import counted, format_limit, format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table, Whole
 from microrad.mission.tables.mirror import ANGLE_MOST, Angle, DurationOrZero, Frequency, Name
 from microrad.mission.tables.pointing import TwoOffsets, two_axes_problems
@@ -77,7 +77,7 @@ class GeometryTable(Table):
         if len(self.coupling) == 4:
             yield from self._reach_problems()
         else:
-            reason = f"has {len(self.coupling)} items"
+            reason = f"has {counted(len(self.coupling), 'item')}"
             yield Problem("coupling", reason, f"four, row by row: coupling = {_NO_COUPLING} would do")
 
     def _reach_problems(self) -> Iterator[Problem]:

@@ -96,7 +96,7 @@ class LinearPart(Table):
             ("zero_dampings", zeros, self.zero_dampings or ()),
         ):
             if len(dampings) != len(roots):
-                counts = f"has {len(dampings)} items where {key[:4]}s has {len(roots)}"
+                counts = f"has {counted(len(dampings), 'item')} where {key[:4]}s has {len(roots)}"
                 yield Problem(key, counts, f"one damping for each of {key[:4]}s")
         if any(d <= 0.0 for d in self.pole_dampings or ()):
             yield Problem("pole_dampings", "has an unstable pole", "dampings above 0")
@@ -210,7 +210,7 @@ class PrandtlIshlinskiiTable(Table):
         if self.thresholds_v[0] != 0.0:
             yield Problem("thresholds", "does not begin at 0 V", 'a first threshold of "0 V"')
         if len(self.weights_rad_v) != len(self.thresholds_v):
-            counts = f"has {len(self.weights_rad_v)} items where thresholds has {len(self.thresholds_v)}"
+            counts = f"has {counted(len(self.weights_rad_v), 'item')} where thresholds has {len(self.thresholds_v)}"
             yield Problem("weights", counts, "one weight for each threshold")
         if not any(self.weights_rad_v):
             yield Problem("weights", "is zero throughout", "at least one weight above 0")
@@ -229,7 +229,9 @@ class CreepTable(Table):
     def problems(self) -> Iterator[Problem]:
         """A weight for each lag."""
         if len(self.weights_rad_v) != len(self.time_constants_s):
-            counts = f"has {len(self.weights_rad_v)} items where time_constants has {len(self.time_constants_s)}"
+            counts = (
+                f"has {counted(len(self.weights_rad_v), 'item')} where time_constants has {len(self.time_constants_s)}"
+            )
             yield Problem("weights", counts, "one weight for each time constant")
 
 
@@ -315,10 +317,10 @@ class Uncertainty(Table):
         count = len(self.parameters)
         pairs = count * (count - 1) // 2
         if len(self.standard_errors) != count:
-            found = f"has {len(self.standard_errors)} items where parameters has {count}"
+            found = f"has {counted(len(self.standard_errors), 'item')} where parameters has {count}"
             yield Problem("standard_errors", found, "one standard error for each parameter")
         if len(self.correlation) not in (0, pairs):
-            found = f"has {len(self.correlation)} items where {count} parameters have {pairs} pairs"
+            found = f"has {counted(len(self.correlation), 'item')} where {count} parameters have {pairs} pairs"
             yield Problem("correlation", found, f"{pairs} numbers, the lower triangle without the diagonal, or none")
         elif (least := self._least_eigenvalue()) < -INDEFINITE:
             found = f"is not positive semidefinite: its smallest eigenvalue is {least:.3g}"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import SPEED_OF_LIGHT_M_S, counted, format_quantity
 from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table
 from microrad.mission.tables.mirror import ANGLE_MOST, Frequency
 
@@ -67,7 +67,7 @@ def two_axes_problems(**lists: tuple[Sequence[float], str]) -> Iterator[Problem]
     """Lists that have not one value for each axis, by their keys, with what an item could be."""
     for key, (values, item) in lists.items():
         if len(values) != 2:
-            yield Problem(key, f"has {len(values)} items", f'two, for x and y: {key} = ["{item}", "{item}"]')
+            yield Problem(key, f"has {counted(len(values), 'item')}", f'two, for x and y: {key} = ["{item}", "{item}"]')
 
 
 class JitterTable(Table):

@@ -217,8 +217,9 @@ def check_alike(records: Sequence[Recording], done: str) -> None:
             )
         if other.drive.shape[1] != first.drive.shape[1] or other.output.shape[1] != first.output.shape[1]:
             raise IdentificationError(
-                f"{other.path}: {other.drive.shape[1]} inputs and {other.output.shape[1]} outputs, where {first.path} "
-                f"has {first.drive.shape[1]} and {first.output.shape[1]}; choose the same channels in each record."
+                f"{other.path}: {counted(other.drive.shape[1], 'input')} and "
+                f"{counted(other.output.shape[1], 'output')}, where {first.path} has "
+                f"{first.drive.shape[1]} and {first.output.shape[1]}; choose the same channels in each record."
             )
 
 

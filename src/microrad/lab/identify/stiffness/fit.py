@@ -18,6 +18,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
+from microrad.core.units import counted
 from microrad.lab.identify.linear.response import check_alike, response_from_periods
 from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.stiffness import springs as springs_of
@@ -190,8 +191,9 @@ def predicted_error(fit: HystereticStiffnessFit, record: Recording, drop: int = 
     shape = (record.drive.shape[1], record.output.shape[1])
     if record.rate_hz != fit.rate_hz or shape != (fit.mirror.actuators, fit.mirror.axes):
         raise IdentificationError(
-            f"{record.path}: {shape[0]} inputs and {shape[1]} outputs at {record.rate_hz:g} Hz, where the model has "
-            f"{fit.mirror.actuators} and {fit.mirror.axes} at {fit.rate_hz:g} Hz; give a record like those fitted."
+            f"{record.path}: {counted(shape[0], 'input')} and {counted(shape[1], 'output')} at {record.rate_hz:g} Hz, "
+            f"where the model has {fit.mirror.actuators} and {fit.mirror.axes} at {fit.rate_hz:g} Hz; give a record "
+            "like those fitted."
         )
     return np.asarray((record.output - simulate_hysteretic_stiffness(fit, record.drive))[drop:])
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.units import counted
 from microrad.lab.recording.checks.channel import clipping, drift, quantisation
 from microrad.lab.recording.checks.drive_and_output import excitation, follows
 from microrad.lab.recording.records import MIN_SAMPLES, Finding, RecordingError
@@ -87,7 +88,7 @@ def _check_size(where: str, label: str, values: Floats, place: Callable[[int], s
     if bad.size:
         row = int(bad[0])
         raise RecordingError(
-            f"{where}: {place(row)} of {label} is {values[row]}, {bad.size} such samples in all; "
+            f"{where}: {place(row)} of {label} is {values[row]}, {counted(bad.size, 'such sample')} in all; "
             "remove or repair it, because hysteresis remembers what happened in a gap."
         )
     row = int(np.argmax(np.abs(values)))

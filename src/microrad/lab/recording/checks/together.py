@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from microrad.core.units import counted
 from microrad.lab.recording.checks.drive_and_output import FAINT
 from microrad.lab.recording.checks.signals import check_separable, covariance
 from microrad.lab.recording.records import Recording, RecordingError
@@ -53,6 +54,7 @@ def _check_alike(first: Recording, other: Recording) -> None:
     counts = [(r.drive.shape[1], r.output.shape[1]) for r in (first, other)]
     if counts[0] != counts[1]:
         raise RecordingError(
-            f"{other.path}: {counts[1][0]} inputs and {counts[1][1]} outputs, where {first.path} has {counts[0][0]} "
-            f"and {counts[0][1]}; name the same channels in each recording, in the same order."
+            f"{other.path}: {counted(counts[1][0], 'input')} and {counted(counts[1][1], 'output')}, where "
+            f"{first.path} has {counts[0][0]} and {counts[0][1]}; name the same channels in each "
+            "recording, in the same order."
         )
