@@ -419,6 +419,11 @@ def test_what_a_broadband_record_is_not_fitted_for_is_told_in_full():
         "narrow: broadband as its role says, though its drive does not fill a decade of frequencies: poles and zeros "
         "outside what it fills are not known."
     ]
+    wide = recording(multisine(0.3), name="wide")
+    for both in ((narrow, wide), (wide, narrow)):  # each is judged by itself
+        served = roles([sine, *both])
+        assert len(served.response) == 2
+        assert [each.partition(":")[0] for each in warnings.use_warnings(served, linear=True)] == ["narrow"]
     one = recording(multisine(0.3), period=8000, name="one")
     assert warnings.use_warnings(roles([sine, one]), linear=True) == [
         "one: one period only, so it is fitted as a drive that does not repeat; record two periods, or the same lines "

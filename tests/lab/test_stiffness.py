@@ -282,6 +282,8 @@ def test_a_known_mirror_is_recovered(known, training):
     assert fit.classes == (0, 0, 0, 1, 1, 1, 2, 2, 2)
     assert all(after < before for before, after in zip(fit.costs, fit.costs[1:], strict=False))
     assert (fit.error_rms < 0.3 * fit.start_error_rms).all()
+    sizes = [rms(record.output) for record in training]
+    assert (fit.start_error_rms < max(sizes)).all() and (fit.start_error_rms > 0.01 * min(sizes)).all()
     # The delay of a third of a sample is traded with what plays at other thresholds than the truth's leave.
     assert fit.delay_s == pytest.approx(7e-4, abs=0.35 / RATE_HZ) and 0 < fit.delay_error_s < 1e-4
     assert fit.poles_rad_s.imag == pytest.approx([900, 1700], rel=0.02)

@@ -1008,3 +1008,11 @@ def test_the_optics_of_a_mission_have_each_number_of_its_table(file, mirror_angl
              "layout": "tripod", "actuator_radius_m": 0.02}  # fmt: skip
     found = scenario.optics(of_table(file, geometry=given), mirror_angle)
     assert found == Geometry(angle, 0.2, 1.0, 0.3, ((1.0, 0.1), (-0.2, 0.9)), "tripod", 0.02)
+
+
+def test_a_loop_of_both_axes_turns_its_mirrors_axes_as_the_geometry_says(file):
+    """A quarter of a turn: the mirror's x moves y, and its y moves x the other way."""
+    quarter = of_table(file, geometry={"rotation_rad": 0.5 * math.pi})
+    turned = replace(file, mission=file.mission.model_copy(update={"fine_pointing": quarter}))
+    np.testing.assert_allclose(scene_of(file).loop.optics, np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(scene_of(turned).loop.optics, [[0.0, -1.0], [1.0, 0.0]], atol=1e-12)

@@ -197,3 +197,17 @@ def test_errors_in_windows_are_told_by_source_before_and_behind_the_loop():
         assert set(each.left) == {"vibration", "wheel", "optical sensor noise", "gauge noise"}
     assert mean.rational == pytest.approx(math.hypot(*(rational_rms(d, mean.index) for d in (SLOW, LINES))))
     assert math.isnan(drift.rational)
+
+
+def test_lines_and_noises_of_one_name_add_up():
+    """Of a wheel with two lines, and of a vibration that is called as a line is."""
+    of_two = replace(LINES, lines=(SpectralLine(2e-6, 30.0), SpectralLine(1e-6, 47.0)))
+    one, other = (replace(LINES, lines=(line,)) for line in of_two.lines)
+    index = ErrorIndex("RPE", 0.005)
+
+    def left(*vibration):
+        return variances(windowed(close(replace(LOOP, vibration=vibration).parts, LOOP.assembled(TRACKING)), index))
+
+    alone = left(one)["wheel"], left(other)["wheel"], left(SLOW)["vibration"]
+    assert left(of_two)["wheel"] == pytest.approx(alone[0] + alone[1], rel=1e-12)
+    assert left(one, replace(SLOW, name="wheel"))["wheel"] == pytest.approx(alone[0] + alone[2], rel=1e-12)

@@ -1415,6 +1415,14 @@ def test_an_ephemeris_holds_as_far_as_it_reaches_whichever_end_it_is(tmp_path, w
     assert str(refused.value).startswith(words)
 
 
+def test_an_ephemeris_that_begins_before_the_day_holds_no_longer_for_that(tmp_path):
+    """It ends an hour behind the span, wherever it begins."""
+    own = pair_of(tmp_path).leo.orbit
+    (tmp_path / "a.oem").write_text(ephemeris(own, np.arange(-7200.0, 21601.0, 400.0)), encoding="utf-8")
+    given = {"orbit.leo": {"kind": "ephemeris", "file": "a.oem"}, "orbit.duration": "5 h"}
+    assert pair_of(tmp_path, given).tail_s == 3600.0
+
+
 @pytest.mark.parametrize(("changes", "words"), [
     ({"orbit.epoch": "2060-02-28T00:00:00Z"}, "orbit.epoch: '2060-02-28T00:00:00Z' is outside 1973-01-02 to 2050"),
     ({"orbit.leo": SETS}, "orbit.leo: FOLDER/a.tle: there is no such file; check the path: a name in a mission is "

@@ -947,6 +947,11 @@ def test_velocities_of_another_frame(tmp_path, frame):
             no_ephemeris(tmp_path, text, "are not those at which the positions are passed")
 
 
+@pytest.mark.parametrize("centre", ["EARTH", "Earth", "earth"])
+def test_the_centre_may_be_written_in_capitals_or_not(tmp_path, centre):
+    assert ephemeris(tmp_path, HEAD + segment(GRID, CENTER_NAME=centre)).span_s == (0.0, GRID[-1])
+
+
 def test_a_frame_that_does_not_turn_may_have_an_epoch(tmp_path):
     ephemeris(tmp_path, HEAD + segment(GRID, REF_FRAME="EME2000", REF_FRAME_EPOCH=stamp(0)))
 

@@ -3197,3 +3197,21 @@ def test_a_number_that_is_bare_and_beyond_its_domain_has_both_reasons(monkeypatc
     (found,) = of.data({"z": {"a": 1.0}})
     assert (found["sign"], found["beyond"], len(found["because"])) == (marks.BEYOND + marks.BARE, ["link.range"], 2)
     assert found["because"][-1].startswith("Compared with nothing")
+
+
+def test_contacts_without_lock_may_differ_by_five_standard_errors_of_all_that_is_drawn(monkeypatch):
+    """Of 3 contacts in each of 20 runs, 400 acquisitions that the runs draw from, and those of the expectation."""
+    given = {"operations.runs": 20.0, "acquisition.runs": 400.0, "communication.data_rate": 1e9}.__getitem__
+    lengths = {f"day.contacts.{k}.duration_s": 300.0 for k in range(3)}
+    volumes = {f"day.relay.could_carry_{which}_bit": 1.0 for which in ("least", "most")}
+    numbers = {"day.relay.contacts": 3.0, "day.relay.contacts_without_acquisition": 0.8, **lengths, **volumes}
+    way = SimpleNamespace(capacity_spread_bit=(1.0, 1.0), failed_contacts=0.7)
+    monkeypatch.setattr(operation, "_seldom", lambda workspace: (given, way))
+    monkeypatch.setattr(operation, "relay_spans", lambda mission: [(0.0, 300.0)] * 3)
+    monkeypatch.setattr(operation, "_volumes", lambda mission, spans: np.ones((4, 2)))
+    drawn = np.where(np.arange(operation._ACQUIRED) % 4 == 0, np.inf, 1.0)
+    monkeypatch.setattr(operation, "acquisitions", lambda mission, count: drawn)
+    found = list(operation._spread(SimpleNamespace(given=given, numbers=lambda what: numbers)))[4:]
+    assert [(each.expected, each.obtained) for each in found] == [(0.75, 0.8), (0.75, 0.7)]
+    variances = 0.25 * 0.75 * np.array([3 / 20, 9 / 400, 9 / operation._ACQUIRED])  # of a count of contacts
+    assert [each.tolerance for each in found] == pytest.approx([5.0 * math.sqrt(variances.sum())] * 2)

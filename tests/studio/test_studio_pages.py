@@ -2470,3 +2470,19 @@ def test_all_that_belongs_to_the_mission_before_is_grey(session, tab, monkeypatc
     page = link.LinkPage(session)
     page.build()
     assert page.dimmed == (page.cards, page.map, page.key, page.words, page.table)
+
+
+def test_a_recording_that_can_no_longer_be_read_says_why_in_place_of_its_samples(bench, monkeypatch):
+    """Its channels are read again where the studio has started anew."""
+    put_in(bench, "a.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    bench.listings.clear()
+    bench.shown = ""
+
+    def refuse(path):
+        raise mirror.reading.ReadingError("a.csv: cut short")
+
+    monkeypatch.setattr(mirror.reading, "list_channels", refuse)
+    asyncio.run(bench._measured())
+    assert (bench.words.text, bench.about.text) == ("a.csv: cut short", "")
+    assert asyncio.run(bench._look_into("", bench.form.setting)) == (None, "")
