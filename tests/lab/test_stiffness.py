@@ -282,8 +282,6 @@ def test_a_known_mirror_is_recovered(known, training):
     assert fit.classes == (0, 0, 0, 1, 1, 1, 2, 2, 2)
     assert all(after < before for before, after in zip(fit.costs, fit.costs[1:], strict=False))
     assert (fit.error_rms < 0.3 * fit.start_error_rms).all()
-    sizes = [rms(record.output) for record in training]
-    assert (fit.start_error_rms < max(sizes)).all() and (fit.start_error_rms > 0.01 * min(sizes)).all()
     # The delay of a third of a sample is traded with what plays at other thresholds than the truth's leave.
     assert fit.delay_s == pytest.approx(7e-4, abs=0.35 / RATE_HZ) and 0 < fit.delay_error_s < 1e-4
     assert fit.poles_rad_s.imag == pytest.approx([900, 1700], rel=0.02)
@@ -740,6 +738,7 @@ def test_a_search_that_ends_at_the_largest_softening_has_not_converged(training,
         monkeypatch.setattr(fit_of, "_AT_LIMIT", share)
         fit = fit_hysteretic_stiffness(training, options=options, iterations=1, start=began)
         assert fit.converged is converged
+    assert fit.start_error_rms == pytest.approx(fit.error_rms, rel=1e-9)  # the search goes nowhere
 
 
 def test_a_delay_that_is_given_is_kept(training):
