@@ -625,8 +625,8 @@ def test_other_refusals(fit_100hz):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"drive": np.zeros((5000, 2))}, "2 drives and 1 outputs; one of each is identified here"),
-        ({"output": np.zeros((5000, 2))}, "1 drives and 2 outputs; one of each is identified here"),
+        ({"drive": np.zeros((5000, 2))}, "2 drives and 1 output; one of each is identified here"),
+        ({"output": np.zeros((5000, 2))}, "1 drive and 2 outputs; one of each is identified here"),
         ({"drive": np.ones((5000, 1))}, "drive or output is constant in the part that is fitted"),
         ({"output": np.ones((5000, 1))}, "drive or output is constant in the part that is fitted"),
     ],
