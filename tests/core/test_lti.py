@@ -618,6 +618,10 @@ def test_doubling_ends_at_the_solutions_that_scipy_finds_with_pivots_of_any_orde
     wanted = np.linalg.solve(matrix, right)
     doubling._eliminate.py_func(matrix, right)
     assert_allclose(right, wanted, rtol=1e-9)
+    small, product = 1e-13 * matrix, np.empty((5, 3))  # as squared microradians are
+    for each in (doubling._product, doubling._product.py_func):
+        each(small, right, product)
+        assert_allclose(product, small @ right, rtol=1e-12, atol=1e-27)
 
 
 def test_a_plant_that_no_input_holds_has_no_solution_of_its_riccati_equation():

@@ -1336,6 +1336,14 @@ def test_the_lag_of_a_correlation_is_that_of_the_input_that_is_most_alike(lag):
     assert alike == pytest.approx(1 / math.sqrt(1 + (0.3 / 4) ** 2), abs=0.03)
 
 
+@pytest.mark.parametrize(("late", "found"), [(40, 40.0), (-40, -40.0)])
+def test_a_correlation_that_is_largest_at_the_end_of_the_search_has_the_lag_of_that_end(late, found):
+    drive = np.zeros(400)
+    drive[200], output = 1.0, np.zeros(400)
+    output[200 + late] = 1.0
+    assert _correlation([drive], output, 40) == (found, 1.0)
+
+
 def test_the_response_of_an_output_has_gain_share_and_coherence_of_each_input():
     one, two = philox(1).standard_normal(20_000), 0.5 * philox(2).standard_normal(20_000)
     found = _response([one, two], 3.0 * one - 8.0 * two + 2.0 * philox(3).standard_normal(20_000), 500.0, 128)

@@ -116,6 +116,10 @@ def test_epoch_of_the_century_and_to_the_microsecond(tmp_path):
     assert elements(tmp_path, f"{line_1}\n{LINE_2}")[0].epoch.text == "2000-01-01T00:00:00Z"
     line_1 = edited(LINE_1, 19, "57366.00000000")
     refused(tmp_path, f"{line_1}\n{LINE_2}", "day 366.00000000 of 1957")
+    # a day is divided by 1440 without a remainder here, and no minute has 60 s
+    for fraction, clock in ((".04375000", "01:03:00"), (".00625000", "00:09:00"), (".99375000", "23:51:00")):
+        line_1 = edited(LINE_1, 19, f"26001{fraction}")
+        assert elements(tmp_path, f"{line_1}\n{LINE_2}")[0].epoch.text == f"2026-01-01T{clock}Z"
     line_1 = edited(LINE_1, 19, "26001.00000001")
     assert elements(tmp_path, f"{line_1}\n{LINE_2}")[0].epoch.text == "2026-01-01T00:00:00.000864Z"
 

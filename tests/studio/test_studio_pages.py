@@ -2486,3 +2486,8 @@ def test_a_recording_that_can_no_longer_be_read_says_why_in_place_of_its_samples
     asyncio.run(bench._measured())
     assert (bench.words.text, bench.about.text) == ("a.csv: cut short", "")
     assert asyncio.run(bench._look_into("", bench.form.setting)) == (None, "")
+
+
+def test_the_figures_of_an_identification_stand_under_their_own_names(job_view):
+    labels = [each.props["aria-label"] for each in (job_view.loop, job_view.residual)]
+    assert labels == ["Measured loop and that of the model", "Residual over time"]
