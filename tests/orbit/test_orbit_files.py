@@ -1150,8 +1150,9 @@ def test_a_catalogue_number_of_noughts_is_0_in_each_notation(tmp_path):
     lines = f"{edited(LINE_1, 3, '00000')}\n{edited(LINE_2, 3, '00000')}"
     (found,) = elements(tmp_path, lines)
     assert (found.name, found.catalogue_number) == ("0", "0")
-    (found,) = elements(tmp_path, kvn({**FIELDS, "NORAD_CAT_ID": "000"}))
-    assert found.catalogue_number == "0"
+    for number, told in (("000", "0"), ("0025540", "25540"), ("100", "100")):
+        (found,) = elements(tmp_path, kvn({**FIELDS, "NORAD_CAT_ID": number}))
+        assert found.catalogue_number == told
     for asked in ("0", "000", " 0 "):
         assert elements(tmp_path, lines + "\n" + NAMED, asked)[0].catalogue_number == "0"
 
