@@ -318,9 +318,10 @@ def test_workers_elsewhere_serve_one_engine_after_another_and_forget(there):
     one = connect(there, '{"4": "endless", "5": "endless"}', late_s=HANG_S)
     next(one.outcomes(iter(chunks(0, 4, 5))))
     one.close()
-    one = connect(there)
-    assert kinds(run(one, chunks(0, 4, 5))) == {}
-    one.close()
+    with no_hang():  # behind a job that was not forgotten it would wait without end
+        one = connect(there)
+        assert kinds(run(one, chunks(0, 4, 5))) == {}
+        one.close()
 
 
 @pytest.mark.promise("campaigns-52")
