@@ -364,7 +364,7 @@ def test_amplitudes_of_other_lengths_rates_or_channels(refused, folder):
     )
     short = arrays(folder, U, Y[:, :1], "200mV")
     message = refused("identify", *files, *AXES, "--output-unit", "m")
-    assert "u_200mV.npy realisation 0: 2 inputs and 1 outputs, where u_100mV.npy realisation 0 has 2 and 2" in message
+    assert "u_200mV.npy realisation 0: 2 inputs and 1 output, where u_100mV.npy realisation 0 has 2 and 2" in message
     np.savez(folder / "slow.npz", u=2.0 * U, y=2.0 * Y, fs=500.0)
     (folder / "list.toml").write_text(
         """axes = ["samples", "channels", "realisations", "periods"]
