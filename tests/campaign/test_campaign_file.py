@@ -1742,16 +1742,17 @@ def test_a_drawn_list_of_an_identified_mirror_goes_by_a_factor_and_leaves_no_unc
 
 
 def test_a_drawn_list_of_a_grid_of_identified_mirrors_is_that_of_each_ones_own(tmp_path):
-    """A drawn pole stands beside the other pole of the same mirror."""
+    """Poles that are moved by one factor are the mirror's of that cell."""
     written(tmp_path, "")
-    own = (tmp_path / "mirror.toml").read_text(encoding="utf-8")
+    own = (tmp_path / "mirror.toml").read_text(encoding="utf-8").replace("linear.poles.1", "linear.poles")
     (pole,) = re.findall(r"poles = \[.*\]", own)
     other = own.replace(pole, 'poles = ["400 Hz", "700 Hz"]').replace("dampings = [0.5]", "dampings = [0.5, 0.2]")
-    (tmp_path / "other.toml").write_text(other, encoding="utf-8")
-    c = loaded(tmp_path, HEAD + LOOP + IDENTIFIED + '[grid]\nmirror = ["mirror.toml", "other.toml"]\n')
+    for name, text in (("one.toml", own), ("other.toml", other)):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    c = loaded(tmp_path, HEAD + LOOP + IDENTIFIED + '[grid]\nmirror = ["one.toml", "other.toml"]\n')
     key = next(each.key for each in c.inputs if each.key.startswith("mirror.linear.poles"))
-    rows = [MissionBuilder(c).mission(cell, {key: 500.0}).mission.mirror.linear.poles_hz for cell in (0, 1)]
-    assert rows == [(500.0,), (500.0, 700.0)]
+    rows = [MissionBuilder(c).mission(cell, {key: 1.25}).mission.mirror.linear.poles_hz for cell in (0, 1)]
+    assert rows == [(1250.0,), (500.0, 875.0)]
 
 
 @pytest.mark.parametrize(("at_most", "shown"), [(16, "16"), (200, "200")])
