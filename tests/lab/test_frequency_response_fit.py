@@ -592,6 +592,12 @@ def test_errors_of_a_table_are_one_for_all_or_for_each_frequency_or_for_each_val
         ),
         (FIVE - 3.0, OF_TWO, None, "frequency 1 is -2 Hz, below 0; leave it out, positive ones say all."),
         (
+            spoilt(FIVE, [0, 2], [0.0, 1e-31]),
+            OF_TWO,
+            None,
+            "frequency 3 is 1e-31 Hz, below 1e-30; check the unit of the column.",
+        ),
+        (
             spoilt(FIVE, [1, 2], [1e-31, 1e-32]),
             OF_TWO,
             None,

@@ -47,7 +47,10 @@ def test_the_residual_is_shown_from_where_it_counts_with_its_times():
 
 
 def test_six_recordings_are_shown_with_the_errors_of_the_model():
-    found = live_fit.thin_fit(judged(count=8))
+    of = judged(count=8)
+    of.predictions = tuple(replace(each, split=60 + k) for k, each in enumerate(of.predictions))
+    found = live_fit.thin_fit(of)
+    assert [loop.split_s for loop in found.loops] == pytest.approx([0.6, 0.61, 0.62, 0.63, 0.64, 0.65])
     assert [loop.name for loop in found.loops] == [f"r{k}.csv" for k in range(6)]
     assert (found.model, found.fit_rms_percent, found.held_out_rms_percent) == ("plays", 1.5, 2.5)
 

@@ -888,7 +888,8 @@ def test_keys_of_version_2_in_a_mirror_of_one_axis(tmp_path):
     assert load_mirror(tmp_path / "mirror.toml").text == largest
     unknown = "is no version of a mirror of one axis"
     assert told(f"version = 1\n{ONE_AXIS}") == [("mirror.version", unknown)]
-    assert told(f"version = true\n{ONE_AXIS}") == [("mirror.version", unknown)]
+    for none in ("true", "false", "0", '""'):
+        assert told(f"version = {none}\n{ONE_AXIS}") == [("mirror.version", unknown)]
     assert told(edited(("version = 2\n", ""))) == [
         ("mirror.version", "is missing, and actuators is a key of version 2")
     ]

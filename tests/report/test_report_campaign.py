@@ -1041,6 +1041,7 @@ def test_an_axis_changes_its_unit_at_a_round_value(largest, unit, name, factor, 
 
 def test_a_limit_of_two_sides_names_both():
     assert campaign_numbers.limit_text(Limit("margin", 3.0, 5.0, ""), "dB") == "margin ≥ 3.00 dB and ≤ 5.00 dB"
+    assert campaign_numbers.limit_text(Limit("margin", 0.0, None, ""), "dB") == "margin ≥ 0.00 dB"
     assert campaign_numbers.limit_text(Limit("data_rate", None, 5e6, ""), "bit/s") == "data_rate (possible) ≤ 5 Mbit/s"
 
 
