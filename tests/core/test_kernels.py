@@ -1209,3 +1209,12 @@ def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch
     assert second.load("another signature") == "code of another"
     assert first.load("one signature") is None  # lost from the index, so it is compiled again
     assert len(list(tmp_path.glob("*.nbc"))) == 2
+
+
+def test_play_operators_go_on_from_the_states_that_each_of_them_has():
+    """A drive in two parts ends where the whole one does."""
+    drive, thresholds = np.random.default_rng(4).normal(0.0, 2.0, 200), np.array([0.0, 0.7, 2.5, 6.0])
+    whole = kernels.play_response(drive, thresholds, np.zeros(4))
+    first = kernels.play_response(drive[:90], thresholds, np.zeros(4))
+    assert len(set(first[-1].tolist())) == 4
+    np.testing.assert_array_equal(kernels.play_response(drive[90:], thresholds, first[-1]), whole[90:])
