@@ -1152,3 +1152,14 @@ def test_responses_of_two_inputs_stand_beside_each_other_under_their_names():
         *((2, 1, "tilt from right", 40.0), (4, 0, "heave from left", 50.0), (4, 1, "heave from right", 60.0)),
     ]
     assert [panel.legend is not None for panel in sheet.panels] == [True] + [False] * 11
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_error_bars_along_one_axis_alone_are_drawn(along):
+    sheet, (panel,) = grid(3.0, 3.0, 1, 1)
+    x, arms = np.array([1.0, 3.0]), np.array([[0.5, 0.25], [0.5, 0.25]])
+    panel.add(Line(x, x, "#0072B2", marker="o", **{f"{along}_arms": arms}))
+    ax = axes_of(sheet)
+    (bars,) = ax.containers
+    assert (bars.has_xerr, bars.has_yerr) == (along == "x", along == "y")
+    pyplot.close("all")

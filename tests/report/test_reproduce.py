@@ -1521,3 +1521,11 @@ def test_the_step_of_a_mission_is_the_largest_of_its_converters(monkeypatch, kin
 )
 def test_a_pattern_of_places_has_dots_lists_and_choices(text, place, fits):
     assert bool(tolerances._pattern(text).fullmatch(place)) is fits
+
+
+@pytest.mark.parametrize("unlike", [{}, {"numpy": ("1.2", "2.0")}])
+@pytest.mark.parametrize("differences", [(), (DIFFERENCE,)])
+def test_what_is_compared_to_the_last_bit_depends_on_the_machine_and_not_on_what_differs(unlike, differences):
+    data = reproduction_data(outcome(unlike=unlike, differences=differences))
+    assert data["same"] == (not differences)
+    assert data["compared"] == ("to stated tolerances" if unlike else "to the last bit")
