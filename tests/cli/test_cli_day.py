@@ -386,3 +386,13 @@ def test_a_plan_in_any_form_is_exit_0_where_data_flow(call, folder, monkeypatch,
 @pytest.mark.parametrize(("name", "code"), [("no contact", 1), ("a share", 0)])
 def test_the_exit_code_is_that_of_the_relay_in_each_form(call, folder, form, name, code):
     assert call("contacts", path_of(folder, MISSIONS[name]), *form).code == code
+
+
+@pytest.mark.parametrize("command", ["contacts", "constellation"])
+def test_links_that_cannot_be_computed_are_refused_with_their_file(refused, folder, command, monkeypatch):
+    def none(given, *more, **how):
+        raise ValueError("no light arrives")
+
+    monkeypatch.setattr("microrad.link.study.run_link_study", none)
+    path = path_of(folder, {"constellation": BY_FILE})
+    assert f"{path}: no light arrives" in " ".join(refused(command, path).split())

@@ -1163,3 +1163,13 @@ def test_error_bars_along_one_axis_alone_are_drawn(along):
     (bars,) = ax.containers
     assert (bars.has_xerr, bars.has_yerr) == (along == "x", along == "y")
     pyplot.close("all")
+
+
+def test_given_axes_in_rows_and_columns_are_taken_row_by_row():
+    sheet, panels = grid(6.0, 6.0, 2, 2)
+    for number, panel in enumerate(panels):
+        panel.title = f"panel {number}"
+    _, given = pyplot.subplots(2, 2)
+    axes_of(sheet, given)
+    assert [[ax.get_title() for ax in row] for row in given] == [["panel 0", "panel 1"], ["panel 2", "panel 3"]]
+    pyplot.close("all")
