@@ -1324,3 +1324,13 @@ def test_a_refusal_of_a_search_says_its_names_times_and_remedy(call, error, word
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_gap_between_two_samples_is_found_on_either_side_whichever_side_the_span_begins_on(sign):
+    def visible(time_s):
+        return sign * (time_s - 10.0) * (90.0 - time_s) * ((time_s - 50.45) ** 2 - 0.04)
+
+    edges = np.array([0.0, 10.0, 50.25, 50.65, 90.0, 100.0])
+    expected = edges[1:-1].reshape(-1, 2) if sign > 0.0 else edges.reshape(-1, 2)
+    np.testing.assert_allclose(events.positive(visible, np.arange(0.0, 101.0)), expected, atol=1e-3)

@@ -661,8 +661,10 @@ def test_what_will_be_lost_is_said_before_another_mission_is_opened(session, dia
     mission._new(session, lambda table: None)
     assert [texts(each.place) for each in dialogs] == [["Changes that are not saved will be lost."]] * 2
     assert select(dialogs[0]).options == ["leo-geo.toml"]
+    opened = session.opened
     dialogs[0].do()
     assert session.draft.text == TEXT
+    assert session.opened == opened + 1  # another mission, and no change of the one before
 
 
 def test_an_added_table_is_shown(session, dialogs):
