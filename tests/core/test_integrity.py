@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import shutil
 import subprocess
 from types import SimpleNamespace
 
@@ -148,19 +147,3 @@ def test_of_a_record_the_digests_of_the_packages_own_files_count(tmp_path, monke
 
     monkeypatch.setattr(integrity.metadata, "files", absent)
     assert integrity._recorded() == {}
-
-
-@pytest.mark.skipif(shutil.which("git") is None, reason="needs git")
-def test_files_in_a_folder_that_version_control_does_not_know_are_told_one_by_one(tmp_path, monkeypatch):
-    package = tmp_path / "src" / "microrad"
-    package.mkdir(parents=True)
-    (package / "kept.py").write_text("", encoding="utf-8")
-    who = ("-c", "user.name=test", "-c", "user.email=test@localhost")
-    for words in (("init", "--quiet"), ("add", "."), (*who, "commit", "--quiet", "--message", "first")):
-        subprocess.run(["git", *words], cwd=tmp_path, check=True)
-    (package / "room").mkdir()
-    for name in ("one.py", "two.py"):
-        (package / "room" / name).write_text("", encoding="utf-8")
-    monkeypatch.setattr(integrity, "_PROJECT", tmp_path)
-    found = integrity._against_commit()
-    assert found.against.startswith("commit ") and found.added == ("room/one.py", "room/two.py")
