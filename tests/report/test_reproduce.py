@@ -1529,8 +1529,3 @@ def test_what_is_compared_to_the_last_bit_depends_on_the_machine_and_not_on_what
     data = reproduction_data(outcome(unlike=unlike, differences=differences))
     assert data["same"] == (not differences)
     assert data["compared"] == ("to stated tolerances" if unlike else "to the last bit")
-
-
-def test_a_name_that_no_file_can_have_is_replaced():
-    assert manifest_reader.plain("vibration.csv") == "vibration.csv"
-    assert manifest_reader.plain("vibration\ud800.csv") == ""
