@@ -1363,3 +1363,8 @@ def test_links_alone_have_no_mirror_to_identify_and_two_cells_are_looked_at():
         f"inputs.mirror =  is to be identified, but the mission has no mirror, only its links: {expected}",
     ]
     assert draws.DrawReader(None, DATA, (), frozenset())._shares("", None, 4) == (0.25,) * 4
+
+
+def test_drawn_switches_and_lists_are_told_as_the_file_has_them():
+    even = OneOf((1.0, 2.0), (0.5, 0.5), (False, ["1 urad", "2 urad"]), True)
+    assert even.words("") == "one of 1 = false, 2 = [1 urad, 2 urad]"

@@ -1775,3 +1775,11 @@ def test_a_precision_without_half_width_of_what_is_no_output_is_told_both(tmp_pa
     assert found.keys() == {"precision.output", "precision.half_width"}
     assert found["precision.output"].nearest == '"margin"'
     assert "text in quotes" not in found["precision.half_width"].expected
+
+
+def test_a_drawn_switch_is_told_as_the_file_has_it(tmp_path):
+    c = loaded(tmp_path, HEAD + distributed("point_ahead.corrected", TABLE + "values = [false, true]"))
+    told = MissionBuilder(c).mission(0, {"point_ahead.corrected": 1.0})
+    assert told.mission.point_ahead.corrected is False
+    source = told.sources["point_ahead.corrected"]
+    assert (source.value, source.comment) == ("false", "campaign: drawn, false")

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.campaign.definition.values import text_of
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Table
@@ -151,7 +152,7 @@ class OneOf:
 
     def words(self, unit: str) -> str:
         """In words; a list of words is numbered as its column is."""
-        numbers = [f"{i} = {word}" for i, word in enumerate(self.written, 1)]
+        numbers = [f"{i} = {text_of(word)}" for i, word in enumerate(self.written, 1)]
         names = numbers if self.is_words else [quantity(value, unit) for value in self.values]
         even = len(set(self.probabilities)) == 1
         shares = "" if even else f", weights {', '.join(f'{p:.3g}' for p in self.probabilities)}"

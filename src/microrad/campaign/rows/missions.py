@@ -21,7 +21,7 @@ from microrad.campaign.definition.keys import (
     within,
 )
 from microrad.campaign.definition.records import CampaignFile, Cell
-from microrad.campaign.definition.values import FILE_WORD
+from microrad.campaign.definition.values import FILE_WORD, text_of
 from microrad.campaign.records import CampaignError
 from microrad.mirror import coupled
 from microrad.mirror.coupled import CoupledMirror
@@ -93,7 +93,7 @@ class MissionBuilder:
         if key in self._listed:
             listed = self._listed[key]
             raw: object = listed.written[listed.values.index(value)]
-            return put(data, key, raw), str(raw)
+            return put(data, key, raw), text_of(raw)
         found = self._single(cell, key)
         if found is None:
             nominal = self._cells[cell].mirror
@@ -102,7 +102,7 @@ class MissionBuilder:
         raw = found.written(value)
         if self._identified and key.startswith(f"{MIRROR}."):
             data = _without_uncertainty(data)
-        return put(data, key, raw), str(raw)
+        return put(data, key, raw), text_of(raw)
 
     def _single(self, cell: int, key: str) -> Key | None:
         """The key of a single value, or of a list as one; None for a whole list of an identified mirror."""
