@@ -333,3 +333,28 @@ def test_three_axes_a_rate_and_an_origin_of_a_list_are_those_of_its_row(tmp_path
     assert (found.name, found.origin, found.source.kind, found.source.axes) == ("slow", "of ours", "drift", "each")
     assert (found.source.gains, found.source.statistic, found.source.size_rad) == ((0.5, 0.0, -0.25), "fixed", None)
     assert (found.source.rate_rad_s, found.source.period_s) == pytest.approx((2.5e-9, 5400.0))
+
+
+def test_a_workbook_may_end_in_capitals_and_is_read_from_its_first_sheet_whichever_was_open(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
+    book = openpyxl.Workbook()
+    for row in (HEADING, ",", ROWS[1], "", ROWS[3]):
+        book.active.append([cell or None for cell in row.split(",")])
+    book.active = book.create_sheet("notes")
+    book.active.append(["nothing of a list"])
+    book.create_sheet("more")
+    book.save(tmp_path / "ERRORS.XLSX")
+    found = read_sources(tmp_path / "ERRORS.XLSX")
+    assert [each.name for each in found] == ["star tracker", "wheels"]
+    assert [each.source for each in found] == [each.source for each in read_sources(listed(tmp_path, ROWS[1], ROWS[3]))]
+    assert found[0].origin == f"{tmp_path / 'ERRORS.XLSX'}, row 3"  # the empty row counts
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_blanks_about_cells_and_lines_of_another_platform_change_nothing(tmp_path, end):
+    path = tmp_path / "errors.txt"
+    rows = (HEADING.title(), "", *ROWS)
+    path.write_bytes(end.join(" , ".join(f"\t{row} ".split(",")) for row in rows).encode())
+    found, plain = read_sources(path), read_sources(listed(tmp_path, *ROWS))
+    assert [(each.name, each.source) for each in found] == [(each.name, each.source) for each in plain]
+    assert [found[0].origin, found[1].origin] == ["ground calibration", f"{path}, row 4"]

@@ -1923,3 +1923,63 @@ def test_a_csv_file_with_a_cell_beyond_what_csv_takes_is_refused_with_its_line(t
     path.write_text("OBJECT_NAME,OBJECT_ID,EPOCH,A,B,C\nA," + csv.field_size_limit() * "1" + "2\n", encoding="utf-8")
     with pytest.raises(OrbitError, match=r"elements\.csv, line 2: not CSV \(field larger than field limit"):
         read_elements(path)
+
+
+@pytest.mark.parametrize("notation", ["kvn", "units", "xml", "json", "csv"])
+def test_words_and_units_of_a_message_mean_the_same_in_letters_of_any_size(tmp_path, notation):
+    words = {"CENTER_NAME": "Earth", "REF_FRAME": "TemeOfDate", "TIME_SYSTEM": "utc", "MEAN_ELEMENT_THEORY": "Sgp4"}
+    head, *rest = NOTATIONS[notation](UNLIKE | words).splitlines(keepends=True)
+    if notation in ("kvn", "units"):  # keys and units; the numbers have no letters
+        kept = ("COMMENT", "OBJECT_NAME", "EPOCH", "CREATION")
+        rest = [line if line.startswith(kept) else line.lower() for line in rest]
+    text = "".join([head, *rest]).replace("<MEAN_MOTION>", '<MEAN_MOTION units="Rev/Day">')
+    (found,) = elements(tmp_path, text.replace("<INCLINATION>", '<INCLINATION units="DEG">'))
+    numbers = [2.00561234, 0.0123, 55.25, 120.5, 33.75, 327.125, -0.00045]
+    assert fields_of(found) == pytest.approx(numbers, rel=1e-12)  # radians and back
+    assert (found.name, found.catalogue_number) == ("SECOND SAT", "40123")
+
+
+def test_a_unit_of_xml_that_is_another_one_is_told_in_the_line_of_its_key(tmp_path):
+    text = xml(FIELDS).replace("<ARG_OF_PERICENTER>", '<ARG_OF_PERICENTER units="rad">')
+    line = text[: text.index("<ARG_OF_PERICENTER")].count("\n") + 1
+    words = f"{tmp_path / 'a.txt'}, line {line}: ARG_OF_PERICENTER is in 'rad'; write it in 'deg'"
+    assert line > 3 and refused(tmp_path, text) == words
+
+
+def test_blanks_about_the_cells_of_a_table_and_rows_of_empty_cells_are_nothing(tmp_path):
+    head, first, second = comma(FIELDS).splitlines() + comma(UNLIKE).splitlines()[1:]
+    spaced = [" , ".join(line.split(",")) for line in (head, first, second)]
+    text = "\n".join([spaced[0], "," * head.count(","), spaced[1], "", spaced[2] + " "])
+    found = elements(tmp_path, text)
+    plain = elements(tmp_path, "\n".join([head, first, second]))
+    assert [replace(each, place="") for each in found] == [replace(each, place="") for each in plain]
+    assert [each.place.rpartition(" ")[2] for each in found] == ["3", "5"]
+
+
+def test_the_words_of_an_ephemeris_may_be_in_small_letters(tmp_path):
+    given = {"TIME_SYSTEM": "tai", "REF_FRAME": "eme 2000", "INTERPOLATION": "lagrange", "INTERPOLATION_DEGREE": "8"}
+    text = HEAD + segment(GRID, **{key: value.upper() for key, value in given.items()})
+    small = HEAD + segment(GRID, **given).replace("TIME_SYSTEM", "time_system").replace(
+        "INTERPOLATION_D", "interpolation_d"
+    )
+    one, other = ephemeris(tmp_path, text), ephemeris(tmp_path, small)
+    (part,) = other.segments
+    assert (part.method, part.points, other.span_s) == ("LAGRANGE", 9, one.span_s)
+    assert other.span_s == (-37.0, 5963.0)  # TAI is 37 s ahead of UTC
+    np.testing.assert_array_equal(other.states(GRID[3:-3] - 37.0), one.states(GRID[3:-3] - 37.0))
+
+
+@pytest.mark.parametrize(("clock", "second"), [
+    ("2016-12-31T23:59:60.25", 86400.25),
+    ("2016-366T23:59:60", 86400.0),
+    ("2016-12-31T23:59:60.999Z", 86400.999),
+])  # fmt: skip
+def test_a_state_vector_may_stand_within_a_leap_second_that_there_was(tmp_path, clock, second):
+    given = messages.Field("EPOCH", clock, "", "line 9")
+    day, found = messages.instant(tmp_path, given, "UTC")
+    assert (day, found) == (datetime(2016, 12, 31).toordinal(), pytest.approx(second, abs=1e-9))
+    for system in ("TAI", "GPS"):
+        with pytest.raises(OrbitError, match=r"line 9: EPOCH is '2016-12-31T23:59:60\.25', a second that"):
+            messages.instant(tmp_path, given._replace(value="2016-12-31T23:59:60.25"), system)
+    with pytest.raises(OrbitError, match=r"a second that does not exist: .*none was inserted on that day"):
+        messages.instant(tmp_path, given._replace(value="2015-12-31T23:59:60.25"), "UTC")
