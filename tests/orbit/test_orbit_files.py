@@ -1983,3 +1983,22 @@ def test_a_state_vector_may_stand_within_a_leap_second_that_there_was(tmp_path, 
             messages.instant(tmp_path, given._replace(value="2016-12-31T23:59:60.25"), system)
     with pytest.raises(OrbitError, match=r"a second that does not exist: .*none was inserted on that day"):
         messages.instant(tmp_path, given._replace(value="2015-12-31T23:59:60.25"), "UTC")
+
+
+@pytest.mark.parametrize(
+    ("clock", "end"), [("12:34:56.", ""), ("12:34:56.Z", ""), ("12:34:56Z", ""), ("12:34:56.50", ".5")]
+)
+def test_the_epoch_of_elements_may_end_in_a_point_or_its_zone(tmp_path, clock, end):
+    (found,) = elements(tmp_path, kvn(FIELDS | {"EPOCH": f"2026-079T{clock}"}))
+    assert found.epoch.text == f"2026-03-20T12:34:56{end}Z"
+
+
+def test_covariances_of_an_ephemeris_in_xml_are_no_metadata(tmp_path):
+    given = "<covarianceMatrix><EPOCH>{}</EPOCH><REF_FRAME>RTN</REF_FRAME><CX_X>{}</CX_X></covarianceMatrix>"
+    both = given.format(stamp(0), 1.0) + given.format(stamp(600), 2.0)
+    plain = oem_xml(GRID)
+    text = plain.replace("</data>", f"{both}</data>")
+    assert text != plain
+    one, other = ephemeris(tmp_path, plain), ephemeris(tmp_path, text)
+    assert (other.name, other.span_s) == (one.name, one.span_s)
+    np.testing.assert_array_equal(other.states(GRID[1:-1]).position_m, one.states(GRID[1:-1]).position_m)
