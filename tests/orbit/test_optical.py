@@ -383,3 +383,78 @@ def test_the_contacts_of_a_network_name_their_stations(unlike):
     assert [c.begins for c in way.contacts] == [f"elevation mask of {name}" for name in way.stations]
     north = "tromso kiruna tromso kiruna kiruna"
     assert " ".join(way.stations) == f"tenerife {north} tenerife tromso kiruna kiruna tenerife"
+
+
+def test_the_sides_of_stations_unlike_each_other_are_those_of_each(tmp_path):
+    places = {"south": (-33.25, -70.5, "50 deg"), "flat": (10.0, 20.0, "0 deg"), "north": (60.0, 30.0, "3 deg")}
+    radios = {
+        name: {"latitude": f"{lat} deg", "longitude": f"{lon} deg", "height": "300 m", "mask": mask}
+        for name, (lat, lon, mask) in places.items()
+    }
+    months = [0.05 * k for k in range(1, 13)]
+    changes = {"operations.downlink.stations": radios, "orbit.leo.local_time": "20.25 h", "orbit.leo.limits": None}
+    m = day_file(tmp_path, ALONE, changes, optical({"tenerife": 0.9, "kiruna": months, "tromso": 0.0})).mission
+    own = assumptions.Case(m.operations, m.orbit, link.of(m), PointingLoss(1.0, 0.01, "stated"))
+    sides = {name: each for name, *each in assumptions._changes(own, None)}
+
+    def stations_of(name, side, table):
+        return getattr(sides[name][side][1].operations, table).stations
+
+    assert [text for text, _ in sides["ground stations"]] == ["without south", "one more, opposite south"]
+    assert list(stations_of("ground stations", 0, "downlink")) == ["flat", "north"]
+    added = stations_of("ground stations", 1, "downlink")
+    opposite = added["opposite south"]
+    assert list(added) == ["south", "flat", "north", "opposite south"]
+    assert [math.degrees(opposite.latitude_rad), math.degrees(opposite.longitude_rad)] == pytest.approx([33.25, 109.5])
+    assert (opposite.height_m, opposite.mask_rad) == (added["south"].height_m, added["south"].mask_rad)
+    for side, masks in ((0, [0.0, 0.0, 0.0]), (1, [89.0, 0.0, 6.0])):
+        found = [math.degrees(each.mask_rad) for each in stations_of("elevation mask", side, "downlink").values()]
+        assert found == pytest.approx(masks, abs=1e-9)  # degrees and back
+    half, clear = (
+        {
+            name: each.availability
+            for name, each in stations_of("availability of the optical stations", side, "optical").items()
+        }
+        for side in (0, 1)
+    )
+    assert half == {"tenerife": (0.45,), "kiruna": pytest.approx([0.5 * each for each in months]), "tromso": (0.0,)}
+    assert clear == {"tenerife": (1.0,), "kiruna": (1.0,) * 12, "tromso": (1.0,)}
+    assert list(stations_of("optical ground stations", 0, "optical")) == ["kiruna", "tromso"]
+    assert sides["optical ground stations"][0][0] == "without tenerife" and sides["optical ground stations"][1] is None
+    (text, later), none = sides["local time of the node"]
+    assert (text, none, later.orbits.leo.local_time_s) == ("6 h later", None, pytest.approx(2.25 * 3600.0))
+    (text, held), none = sides["attitude of the satellite"]
+    limits = held.orbits.leo.limits
+    assert (text, none, limits.attitude, limits.boresight) == (
+        "nadir, 60 deg about zenith",
+        None,
+        "nadir",
+        (0.0, 0.0, -1.0),
+    )
+    assert math.degrees(limits.field_of_regard_rad) == pytest.approx(60.0)
+    assert (math.degrees(limits.slew_limit_rad_s), limits.sun_exclusion_rad, limits.in_eclipse) == (
+        pytest.approx(10.0),
+        0.0,
+        True,
+    )
+
+
+@pytest.mark.parametrize(("at_low", "here", "at_high", "factor"), [
+    ((6.0, 2.0), (5.0, 0.0), (4.0, 0.0), math.inf),  # a ratio of 3, and twice of an infinite one
+    ((6.0, 0.0), (5.0, 0.0), (4.0, 0.0), 1.5),
+    ((6.0, 3.0), (5.0, 2.0), (8.0, 2.0), 2.0),
+    ((6.0, math.nan), (3.0, math.nan), (9.0, math.nan), 3.0),
+    ((0.0, 2.0), (5.0, 2.0), (4.0, 2.0), math.inf),
+])  # fmt: skip
+def test_how_far_an_assumption_moves_the_comparison_is_told_by_all_three_of_its_cases(at_low, here, at_high, factor):
+    cases = [
+        assumptions.Numbers(*volumes, 1.0, 1.0, optical_bit)
+        for volumes, optical_bit in zip((at_low, at_high, here), (7.0, 8.0, 2.0), strict=True)
+    ]
+    swing = assumptions.Swing("x", "low", "high", *cases)
+    assert (swing.of_relay, swing.of_optical) == (pytest.approx(factor), 4.0)
+    assert swing.factor == pytest.approx(max(factor, 4.0))
+    without = assumptions.Swing(
+        "x", "low", "high", *[assumptions.Numbers(*each, 1.0, 1.0) for each in (at_low, at_high, here)]
+    )
+    assert (without.of_optical, without.factor) == (1.0, pytest.approx(factor))
