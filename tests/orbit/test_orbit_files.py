@@ -2002,3 +2002,37 @@ def test_covariances_of_an_ephemeris_in_xml_are_no_metadata(tmp_path):
     one, other = ephemeris(tmp_path, plain), ephemeris(tmp_path, text)
     assert (other.name, other.span_s) == (one.name, one.span_s)
     np.testing.assert_array_equal(other.states(GRID[1:-1]).position_m, one.states(GRID[1:-1]).position_m)
+
+
+@pytest.mark.parametrize("unit", ["1/ER", "1/er", "1/Er"])
+def test_the_drag_of_a_message_may_have_its_unit(tmp_path, unit):
+    with_unit = kvn(UNLIKE).replace("BSTAR = -0.00045", f"BSTAR = -0.00045 [{unit}]")
+    for text in (with_unit, xml(UNLIKE).replace("<BSTAR>", f'<BSTAR units="{unit}">')):
+        assert f"{unit}" in text and elements(tmp_path, text)[0].drag_per_earth_radius == -0.00045
+
+
+def test_lines_of_a_table_are_counted_with_the_empty_ones_before_it(tmp_path):
+    cell = csv.field_size_limit() * "1"
+    message = refused(tmp_path, f"\n \n\n{comma(FIELDS)}\n{cell}2\n")
+    assert message.startswith(f"{tmp_path / 'a.txt'}, line 7: not CSV (field larger than field limit")
+
+
+def turned_round(line):
+    time, *words = line.split()
+    return " ".join([time, *words[:3], *(str(-float(word)) for word in words[3:])])
+
+
+def moved_away(line):
+    time, *words = line.split()
+    return " ".join([time, *(str(1.5 * float(word)) for word in words[:3]), *words[3:]])
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (turned_round, "the velocities, 0.2"),  # of two that nearly cancel
+    (moved_away, "the positions are passed at "),
+])  # fmt: skip
+def test_a_state_vector_that_does_not_fit_the_one_before_it_is_told_in_its_own_line(tmp_path, change, said):
+    text = with_row(30, change)
+    line = text.split("\n").index(next(each for each in text.split("\n") if each.startswith(stamp(1800)))) + 1
+    message = no_ephemeris(tmp_path, text)
+    assert message.startswith(f"{tmp_path / 'a.txt'}, line {line}: from {stamp(1740)} to {stamp(1800)} {said}")
