@@ -7,7 +7,16 @@ import pytest
 
 from made_tables import made, one_line, told
 from microrad.mission.fields import ProblemsError, Quantity
-from microrad.mission.file import MissionError, load_coupled_mirror, load_mirror, load_mission
+from microrad.mission.file import (
+    MissionError,
+    holds_several_axes,
+    load_coupled_mirror,
+    load_loop,
+    load_mirror,
+    load_mission,
+    mirror_of_loop,
+    with_contents,
+)
 from microrad.mission.tables import coupled_mirror, coupled_parts
 from microrad.mission.tables import mirror as mirror_table
 from microrad.mission.tables.coupled_mirror import CoupledMirror, in_order, on_a_line, parameters
@@ -23,6 +32,7 @@ from microrad.mission.tables.coupled_parts import (
 )
 from microrad.mission.toml import scan
 from places import ROOT
+from shipped import without_fine_pointing
 from waiting import no_hang
 
 PAGE = (ROOT / "docs" / "mirror-file.md").read_text(encoding="utf-8")
@@ -1290,3 +1300,64 @@ def test_correlations_of_three_parameters_are_three_or_none(items, told):
     found = [(each.key, each.reason, each.expected) for each in table.problems()]
     wanted = ("correlation", f"has {items} item{'s' * (items != 1)} where 3 parameters have 3 pairs")
     assert found == ([(*wanted, "3 numbers, the lower triangle without the diagonal, or none")] if told else [])
+
+
+# ------------------------------------------------------------------------------------------ the mirror of a loop
+DEFAULT_TEXT = MISSION.read_text(encoding="utf-8")
+IN_THE_LOOP = DEFAULT_TEXT.replace("\n[fine_pointing]\n", '\n[fine_pointing]\nmirror_file = "lab/two-axes.toml"\n', 1)
+
+
+@pytest.mark.parametrize(("version", "held"), [
+    ("2", True), ("3", False), ("1", False), ("2.0", False), ('"2"', False), ("[2]", False), ("true", False),
+    (None, False),
+])  # fmt: skip
+def test_a_mirror_file_says_by_a_whole_number_that_it_has_several_axes(tmp_path, version, held):
+    given = "" if version is None else f"version = {version}\n"
+    (tmp_path / "mirror.toml").write_text(f"{given}unknown = 5\n", encoding="utf-8")
+    assert holds_several_axes(tmp_path / "mirror.toml") is held
+
+
+@pytest.fixture
+def laboratory(tmp_path):
+    """A folder with a mission whose loop names a mirror, and with mirrors of one and of two axes."""
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab" / "two-axes.toml").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "mission.toml").write_text(IN_THE_LOOP, encoding="utf-8")
+    (tmp_path / "one.toml").write_text(ONE_AXIS.replace('name = "', 'name = "our ', 1), encoding="utf-8")
+    (tmp_path / "two.toml").write_text(edited(('name = "', 'name = "our ')), encoding="utf-8")
+    return tmp_path
+
+
+def test_a_loop_has_the_mirror_of_its_file_beside_a_given_one_of_one_axis(laboratory):
+    file, mirror = load_loop(laboratory / "mission.toml", str(laboratory / "one.toml"))
+    assert file.mirror_file.path == laboratory / "one.toml"
+    assert file.mission.mirror.name.startswith("our ") and mirror == loaded(TEXT)
+
+
+def test_a_given_mirror_of_several_axes_is_that_of_the_loop_and_leaves_the_mission_its_own(laboratory):
+    file, mirror = load_loop(laboratory / "mission.toml", str(laboratory / "two.toml"))
+    assert (file.mirror_file, mirror) == (None, load_coupled_mirror(laboratory / "two.toml"))
+    assert not file.mission.mirror.name.startswith("our ") and mirror.name.startswith("our ")
+
+
+def test_a_loop_without_a_file_for_it_and_a_mission_without_a_loop_have_no_such_mirror():
+    for text in (DEFAULT_TEXT, without_fine_pointing(DEFAULT_TEXT)):
+        file = load_mission(MISSION, text=text)
+        assert mirror_of_loop(file) is None
+    assert file.mission.fine_pointing is None
+
+
+def test_the_mirror_of_a_loop_is_that_of_the_time_at_which_its_mission_was_read(laboratory):
+    named = laboratory / "lab" / "two-axes.toml"
+    named.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
+    file = load_mission(laboratory / "mission.toml")
+    read = with_contents(file)
+    named.write_text(edited(('name = "', 'name = "another ')), encoding="utf-8")
+    assert mirror_of_loop(read) == loaded(TEXT)
+    assert mirror_of_loop(file).name.startswith("another ")
+    named.write_bytes(TEXT.encode().replace(b"\n", b"  # \xff\n", 3).replace(b"  # \xff", b"", 2))
+    read = with_contents(file)
+    named.unlink()
+    for of, reason in ((read, "is not UTF-8 text (line 3)"), (file, "does not exist")):
+        fault = only_fault(lambda of=of: mirror_of_loop(of))
+        assert (fault.file, fault.reason) == (str(named), f"the mirror file {reason}")
