@@ -1482,3 +1482,46 @@ def test_the_velocity_on_an_ellipse_is_the_rate_of_its_position(j2):
     for _ in range(100):
         anomaly = 4.1 + 0.26 * math.sin(anomaly)
     assert radius == pytest.approx(9.2e6 * (1.0 - 0.26 * math.cos(anomaly)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("contacts", "gap_s"), [
+    ([(0.0, 40.0), (70.0, 100.0)], 30.0),  # the one that ends with the span leaves no gap in it
+    ([(0.0, 40.0), (70.0, 99.5)], 50.5),
+    ([(45.0, 50.0), (80.0, 160.0)], 45.0),
+    ([(120.0, 130.0)], 120.0),
+])  # fmt: skip
+def test_a_gap_that_begins_with_the_end_of_the_span_is_none_of_it(contacts, gap_s):
+    pair = SimpleNamespace(span_s=(0.0, 100.0), whole_s=(0.0, 150.0))
+    given = [SimpleNamespace(start_s=start, end_s=end) for start, end in contacts]
+    assert geometry.longest_gap_s(given, pair) == gap_s
+
+
+@pytest.mark.parametrize(("end_s", "ends"), [(99.0, "Earth"), (100.0, "Earth"), (100.5, "end of the span")])
+def test_a_contact_up_to_the_last_moment_of_a_span_keeps_what_ends_it(end_s, ends):
+    highest = {"highest_rad": 0.5, "highest_s": 70.0}
+    for whole in (orbit.Contact(60.0, end_s, "range", "Earth"), orbit.Pass(60.0, end_s, "range", "Earth", **highest)):
+        cut = geometry.cut_at(whole, 100.0)
+        assert cut == replace(whole, end_s=min(end_s, 100.0), ends=ends)
+        assert (cut is whole) == (end_s <= 100.0)
+
+
+def test_a_pass_that_rises_while_another_station_is_served_begins_when_that_is_free(tmp_path):
+    """Of four passes the second goes on behind the first, the third ends before it, the fourth begins at its end."""
+    m = day_file(
+        tmp_path, ALONE, {"operations.downlink.setup": "20 s", "operations.downlink.data_rate": "8 Mbit/s"}
+    ).mission
+    pair = SimpleNamespace(span_s=(0.0, 1000.0), whole_s=(0.0, 1500.0))
+    seen = SimpleNamespace(pair=pair, duration_s=1000.0)
+    spans = {"b": (250.0, 500.0), "a": (100.0, 400.0), "c": (300.0, 390.0), "d": (500.0, 515.0), "e": (990.0, 1100.0)}
+    passes = tuple((orbit.Pass(*span, "mask", f"mask of {n}", 0.5, span[0]), n) for n, span in spans.items())
+    way = flow.direct(m.operations, seen, passes)
+    assert [(c.start_s, c.end_s, c.begins, c.ends) for c in way.contacts] == [
+        (100.0, 400.0, "mask", "mask of a"),
+        (400.0, 500.0, "station free", "mask of b"),
+        (500.0, 515.0, "mask", "mask of d"),
+        (990.0, 1000.0, "mask", "end of the span"),
+    ]
+    assert way.stations == ("a", "b", "d", "e")
+    assert way.carried_bit.tolist() == pytest.approx([8e6 * 280.0, 8e6 * 80.0, 0.0, 0.0])
+    assert (way.contact_s, way.gap_s) == (425.0, 475.0)
+    assert way.capacity_spread_bit == (way.capacity_bit, way.capacity_bit) == pytest.approx((8e6 * 360.0,) * 2)

@@ -1162,3 +1162,18 @@ def test_leap_seconds_are_counted_to_the_last_second_of_the_tables():
     for one, beyond_s in ((first, first.seconds_to(last) + 1.0), (last, last.seconds_to(first) - 1.0)):
         with pytest.raises(OrbitError, match="outside 1973-01-02 to 2050-12-31"):
             one.utc(beyond_s)
+
+
+@pytest.mark.parametrize("far_s", [-1.7e9, 8e8])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_one_time_of_several_that_the_tables_do_not_have_is_named(far_s, place):
+    epoch = Epoch("2026-03-20T12:00:00Z")
+    time_s = np.insert(np.array([60.0, -60.0]), place, far_s)
+    with pytest.raises(OrbitError) as refused:
+        epoch.earth_rotation_rad(time_s)
+    assert str(refused.value).startswith(
+        f"{far_s:.6g} s after 2026-03-20T12:00:00Z is outside 1973-01-02 to 2050-12-31"
+    )
+    time_s[place] = math.nan
+    with pytest.raises(OrbitError, match="a time of nan s after 2026-03-20T12:00:00Z is not a number"):
+        epoch.earth_rotation_rad(time_s)
