@@ -185,3 +185,18 @@ def test_a_key_for_a_terminal_has_a_line_for_each_fact():
 )
 def test_what_counts_where_a_key_is_left_out_is_told_as_a_file_has_it(value, words):
     assert explain._default(value) == words
+
+
+def test_blanks_about_the_parts_of_a_key_are_nothing():
+    (found,) = explained(" requirement .\tmargin ")
+    assert found == explained("requirement.margin")[0] and found.name == "requirement.margin"
+
+
+def test_of_a_long_name_its_begin_is_held_against_the_keys():
+    name = "fine_pointing.reference.line_of_sight_ra"
+    assert len(name) == 40
+    with pytest.raises(
+        ValueError, match=rf"is called '{re.escape(name)}'; near it are fine_pointing\.reference\.line"
+    ) as told:
+        explained(f"{name}{'x' * 60}")
+    assert "xx" not in str(told.value)

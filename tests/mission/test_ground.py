@@ -691,3 +691,12 @@ def test_range_elevation_and_altitude_of_a_station_above_the_sea_are_one_triangl
     assert path.at(0.625) == GroundPath("leo", 0.625, 2500.0, 6.38e6, 7.25e6, ("a",))
     assert range_of(SimpleNamespace(distance_m=7e5), path) == 7e5
     assert range_of(SimpleNamespace(distance_m=None), path) == path.range_at(0.375)
+
+
+def test_a_range_that_no_elevation_has_is_that_of_the_zenith_or_of_the_nadir():
+    path = GroundPath("leo", 0.5, 0.0, 6.4e6, 7.0e6, ("channel.elevation",))
+    assert path.elevation_at(path.range_at(0.3)) == pytest.approx(0.3, rel=1e-9)
+    assert path.elevation_at(0.5e6) == path.elevation_at(1e3) == math.pi / 2.0
+    assert path.elevation_at(13.5e6) == path.elevation_at(1e9) == -math.pi / 2.0
+    # up from the zenith of the station the altitude is the range
+    assert path.at(math.pi / 2.0).altitude_of(0.6e6) == pytest.approx(7.0e6 - 6378137.0)

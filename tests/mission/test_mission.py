@@ -26,7 +26,17 @@ from microrad.core.units import UnitError
 from microrad.mirror import model as mirror
 from microrad.mission import toml
 from microrad.mission.fields import Bounded, Monthly, OrWord, ProblemsError, Quantity, Several, Share, Switch, Whole
-from microrad.mission.file import MissionError, assumptions, load_coupled_mirror, load_mirror, load_mission
+from microrad.mission.file import (
+    MissionError,
+    assumptions,
+    load_coupled_mirror,
+    load_link,
+    load_mirror,
+    load_mission,
+    mission_file,
+    open_mission,
+    with_values,
+)
 from microrad.mission.model import (
     Amplifier,
     Control,
@@ -2365,3 +2375,89 @@ def test_a_value_that_is_refused_has_the_digits_that_tell_it_from_its_bounds(of,
     with pytest.raises(ValueError) as refused:
         of.check("x", value)
     assert str(refused.value) == words
+
+
+@pytest.mark.parametrize("table", [
+    'file = "nowhere.toml"\n', "file = 5\n", 'file = ""\n', 'file = "mirror.toml"\nbias = "6 V"\n', "version = 2\n", "",
+])  # fmt: skip
+def test_a_mirror_that_is_given_is_the_missions_whatever_it_says_of_its_own(tmp_path, table):
+    (tmp_path / "play.toml").write_text(MIRROR_WITHOUT_MODEL + PLAY, encoding="utf-8")
+    file = load_mission(tmp_path / "mission.toml", tmp_path / "play.toml", text=f"{NO_MIRROR}[mirror]\n{table}{REST}")
+    assert file.mission.mirror == load_mirror(tmp_path / "play.toml").mirror
+    assert (file.mirror_file.path, file.path) == (tmp_path / "play.toml", tmp_path / "mission.toml")
+    assert not file.sources.keys() & {"mirror.file", "mirror.version"}
+
+
+def test_a_document_with_other_values_has_its_own_faults_and_leaves_the_first_as_it_was(tmp_path):
+    (tmp_path / "bent.toml").write_text(edited("travel", '"2.5 m"', MIRROR_TEXT), encoding="utf-8")
+    (tmp_path / "play.toml").write_text(MIRROR_WITHOUT_MODEL + PLAY, encoding="utf-8")
+    document = open_mission(tmp_path / "mission.toml", text=f'{NO_MIRROR}[mirror]\nfile = "bent.toml"\n{REST}')
+    changed = {**document.data, "beacon": {**document.data["beacon"], "distance": "44000"}}
+    told = []
+    for _ in range(2):
+        with pytest.raises(MissionError) as refused:
+            mission_file(with_values(document, changed))
+        told.append([(fault.key, Path(fault.file).name) for fault in refused.value.faults])
+    assert told == [[("beacon.distance", "mission.toml"), ("mirror.travel", "bent.toml")]] * 2
+    assert document.all_faults() == []
+    assert document.data["beacon"]["distance"] != "44000"
+    other = mission_file(with_values(document, document.data, tmp_path / "play.toml"))
+    assert (other.mirror_file.path, other.mission.mirror.bouc_wen) == (tmp_path / "play.toml", None)
+    with pytest.raises(MissionError) as refused:
+        mission_file(document)
+    assert [fault.key for fault in refused.value.faults] == ["mirror.travel"]
+
+
+def test_half_a_character_in_a_text_is_refused_with_its_line(tmp_path):
+    lines = TEXT.split("\n")
+    lines[4] += "  # \ud800"
+    for load in (load_mission, load_link):
+        with pytest.raises(MissionError) as refused:
+            load(tmp_path / "m.toml", text="\n".join(lines))
+        fault = the_fault(refused.value)
+        assert (fault.reason, fault.file) == ("the mission file is not UTF-8 text (line 5)", str(tmp_path / "m.toml"))
+
+
+def test_of_a_hundred_unknown_keys_each_is_told_and_of_more_a_hundred(refuse):
+    for count in (100, 130):
+        more = "".join(f"strange_{k} = {k}\n" for k in range(count))
+        faults = refuse(TEXT.replace("[scenario]\n", f"[scenario]\n{more}")).faults
+        assert [(fault.key, fault.value) for fault in faults] == [(f"scenario.strange_{k}", "") for k in range(100)]
+
+
+@pytest.mark.parametrize(
+    ("key", "reason"),
+    [("mirror.composition", "is none of the choices"), ("name", "is empty"), ("mirror.name", "is empty")],
+)
+def test_an_empty_text_is_told_as_what_its_key_holds(refuse, key, reason):
+    fault = the_fault(refuse(edited(key, '""')))
+    assert (fault.key, fault.value, fault.reason) == (key, '""', reason)
+
+
+def test_a_fault_of_a_table_that_has_only_others_inside_stands_where_the_first_of_those_does():
+    text = b"x = 1\n[beacons]\na = 1\n[beacon_2.inner]\na = 2\n[beacon.lines.a]\na = 3\n[beacon.lines.b]\na = 4\n"
+    document = Document.of(text, Path("m.toml"), "mission file")
+    for key in ("beacon", "beacon.lines", "beacon.lines.b", "beacon.lines.b.c", "beacon.other", "answer"):
+        document.fault(key, "", "is wrong", "another")
+    assert [(fault.key, fault.line) for fault in document.faults] == [
+        ("beacon", 6), ("beacon.lines", 6), ("beacon.lines.b", 8), ("beacon.lines.b.c", 8), ("beacon.other", 0),
+        ("answer", 0),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "meant", "said"), [
+    ("gau\u00dfian", "gaussian", ", it holds U+00DF (LATIN SMALL LETTER SHARP S)"),
+    ("\u00b5m\u0430", "\u00b5ma", ", it holds U+0430 (CYRILLIC SMALL LETTER A)"),
+    ("\u00b5ma", "\u00b5mas", ""),
+    ("a ", "a", ", it begins or ends with a blank"),
+    ("\ue000", "a", ", it holds U+E000 (a character without a name)"),
+])  # fmt: skip
+def test_what_sets_two_words_apart_is_a_letter_that_the_other_does_not_have(given, meant, said):
+    assert toml._apart(given, meant) == said
+
+
+def test_ten_items_of_a_list_are_shown_and_ten_thousand_lines_read():
+    assert shown(list(range(10))) == "[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]"
+    assert shown(list(range(11))) == "[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, …]"
+    assert shown(2**200 - 1) == toml.clipped(str(2**200 - 1)) and shown(-(2**200)) == "(a whole number of 201 bits)"
+    assert Document.of(b"a = 1" + b"\n" * 10_000, Path("m.toml"), "mission file").data == {"a": 1}

@@ -146,3 +146,13 @@ def test_a_value_is_shipped_for_its_own_key_alone():
     assert not origins.is_shipped("terminals.leo_apertures", '"5 cm"')
     assert origins.of_paper("terminals.leo_aperture", '"6 cm"') == '"5 cm"'
     assert origins.of_paper("terminals.leo_aperture", '"50 mm"') == origins.of_paper("terminals.none", '"6 cm"') == ""
+
+
+def test_a_shipped_value_of_several_lines_is_told_in_one(monkeypatch):
+    before = "[\n  1.5,\n  2.5,\n]"
+    monkeypatch.setattr(origins, "_paper", lambda: {"a.b": before, "c": "1"})
+    monkeypatch.setattr(origins, "_shipped", lambda: {("a.b", "paper: Table 1"): (before, "[1.5, 2.50]")})
+    assert origins.of_paper("a.b", "[1.5]") == origins.written_for("a.b", "paper: Table 1", "[1.5]") == "[ 1.5, 2.5, ]"
+    assert origins.of_paper("a.b", "[1.50, 2.5]") == origins.written_for("a.b", "paper: Table 1", "[1.50, 2.5]") == ""
+    assert origins.written_for("a.b", "", "[1.5]") == origins.written_for("a", "paper: Table 1", "[1.5]") == ""
+    assert origins.is_shipped("a.b", "[1.5, 2.5]") and not origins.is_shipped("c", "1")

@@ -1,6 +1,7 @@
 """Contacts by one call: as those of the parts it is made of."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
@@ -92,3 +93,12 @@ def test_an_orbit_of_another_epoch_is_refused_and_so_is_a_station_that_stands_fi
     station = Station("north", math.radians(68.0), math.radians(21.0), 400.0, math.radians(10.0))
     with pytest.raises(OrbitError, match="'north' stands first: give the satellite first"):
         find_contacts(station, leo, START, 7200.0)
+
+
+def test_an_orbit_that_has_no_epoch_of_its_own_counts_from_the_start_on_either_side(leo):
+    """All that an orbit must have are its name and its states."""
+    relay = GeostationarySlot("relay", Epoch(START), math.radians(9.0))
+    plain = SimpleNamespace(name="relay", states=relay.states)
+    found = find_contacts(leo, relay, START, 14_400.0)
+    assert len(found) > 1 and find_contacts(leo, plain, START, 14_400.0) == found
+    assert find_contacts(plain, leo, START, 14_400.0) == found
