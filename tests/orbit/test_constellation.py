@@ -658,3 +658,42 @@ def test_a_plan_serves_each_by_its_name(unlike_plan):
         "a contact +45 +420 2 7 38880000",
         "a range +45 +420 2 7 1",
     ]
+
+
+def test_satellites_that_are_sampled_in_steps_of_their_own_are_each_seen_and_stand_in_order(tmp_path):
+    """One in a low orbit, one half way up and one low again: of contacts that begin at once the first comes first."""
+    epoch, earth, span_s = orbit.Epoch("2026-03-20T12:00:00Z"), orbit.Earth("oblate", 100e3), (0.0, 21600.0)
+    own = [
+        orbit.Terminal(orbit.circular(name, epoch, height_m, 0.9, node, phase, True), orbit.UNLIMITED, name)
+        for name, height_m, node, phase in (("b", 5e5, 0.3, 1.0), ("a", 2.02e7, 1.0, 2.0), ("c", 9e5, 2.0, 4.0))
+    ]
+    relays = [
+        orbit.Terminal(orbit.GeostationarySlot(name, epoch, longitude), orbit.UNLIMITED, name)
+        for name, longitude in (("west", -1.5), ("east", 0.5))
+    ]
+    site = orbit.Station("site", 0.6, 0.2, 300.0, 0.1)
+    ground = constellation.Ground(
+        site,
+        constellation.Site("site", 0.6, 0.2, (1.0,)),
+        operations.RateTable((operations.Step(1e9, 3e7), operations.Step(1e8, math.inf))),
+        1,
+    )
+    done = []
+    rows = as_rows(opportunities(own, relays, earth, epoch, span_s, math.inf, done.append, [ground]))
+    expected = [
+        (place, which, c.start_s, c.end_s)
+        for place, each in enumerate(own)
+        for which, other in enumerate((*relays, site))
+        for c in (
+            orbit.passes(each.orbit, site, epoch, span_s)
+            if other is site
+            else orbit.contacts(each, other, earth, epoch, span_s)
+        )
+    ]
+    expected.sort(key=lambda row: (round(row[2], 4), row[0], row[1]))
+    assert [row[:2] for row in rows] == [row[:2] for row in expected]
+    # both searches leave a microsecond
+    np.testing.assert_allclose([row[2:] for row in rows], [row[2:] for row in expected], rtol=0, atol=1e-4)
+    assert sum(row[2] == 0.0 for row in rows) > 3 and {row[1] for row in rows} == {0, 1, 2}
+    assert {row[0] for row in rows} == {0, 1, 2} and done == [1, 2, 3]
+    assert len({constellation.coarse_step_s(each.orbit, 0.0) for each in own}) == 2
