@@ -1525,3 +1525,28 @@ def test_a_pass_that_rises_while_another_station_is_served_begins_when_that_is_f
     assert way.carried_bit.tolist() == pytest.approx([8e6 * 280.0, 8e6 * 80.0, 0.0, 0.0])
     assert (way.contact_s, way.gap_s) == (425.0, 475.0)
     assert way.capacity_spread_bit == (way.capacity_bit, way.capacity_bit) == pytest.approx((8e6 * 360.0,) * 2)
+
+
+def test_a_way_of_two_runs_has_the_mean_of_both_and_the_store_of_the_first():
+    def run(lost, stored, latency_s, volume):
+        latency = operations.Latency(np.array([latency_s]), np.array([latency_s]), np.array([volume]), stored)
+        return SimpleNamespace(
+            generated_bit=np.array([0.0, 50.0, 100.0]), lost_bit=np.array([0.0, 1.0, lost]),
+            stored_bit=np.array([0.0, 40.0, stored]), latency=latency,
+        )  # fmt: skip
+
+    runs = [run(10.0, 30.0, 5.0, 60.0), run(4.0, 6.0, 8.0, 90.0)]
+    carried = np.array([[1.0, 5.0, 0.0], [3.0, 0.0, 7.0]])
+    contacts = tuple(orbit.Contact(10.0 * k, 10.0 * k + 5.0, "a", "b") for k in range(3))
+    way = flow.way_of("x", contacts, ("p", "q", "r"), 15.0, 7.5, carried, runs, 0.5)
+    assert way.carried_bit.tolist() == [2.0, 2.5, 3.5]
+    assert (way.capacity_bit, way.capacity_spread_bit) == (8.0, (6.0, 10.0))
+    assert (way.generated_bit, way.lost_bit, way.on_board_bit, way.arrived_bit) == (100.0, 7.0, 18.0, 75.0)
+    assert (way.contacts, way.stations, way.contact_s, way.gap_s) == (contacts, ("p", "q", "r"), 15.0, 7.5)
+    assert way.history is runs[0] and way.failed_contacts == 0.5
+    # of 186 bit kept 60 came within 5 s, 90 more within 8 s, and 36 never: 99 % did not
+    assert (way.latency.quantile(60.0 / 186.0), way.median_s, way.slow_s) == (5.0, 8.0, math.inf)
+    assert way.latency.cdf([4.9, 5.0, 7.9, 8.0]).tolist() == pytest.approx([0.0, 60 / 186, 60 / 186, 150 / 186])
+    none = flow.way_of("x", (), (), 0.0, 100.0, np.zeros((2, 0)), runs)
+    assert (none.carried_bit.tolist(), none.capacity_bit, none.capacity_spread_bit) == ([], 0.0, (0.0, 0.0))
+    assert none.failed_contacts == 0.0
