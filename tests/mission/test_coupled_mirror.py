@@ -1361,3 +1361,17 @@ def test_the_mirror_of_a_loop_is_that_of_the_time_at_which_its_mission_was_read(
     for of, reason in ((read, "is not UTF-8 text (line 3)"), (file, "does not exist")):
         fault = only_fault(lambda of=of: mirror_of_loop(of))
         assert (fault.file, fault.reason) == (str(named), f"the mirror file {reason}")
+
+
+@pytest.mark.parametrize(("alpha", "taken"), [(1.125, False), (1.1251, True), (0.9, False)])
+def test_the_decay_of_an_element_exceeds_what_its_own_gamma_and_eta_take_off_it(alpha, taken):
+    """Of beta = 0.5, gamma = -0.125 and eta = 0.5 1/V the larger is |0.5 + 0.5| + 0.125."""
+    keys = f'alpha = "{alpha} 1/V"\nbeta = "0.5 1/V"\ngamma = "-0.125 1/V"\neta = "0.5 1/V"\n'
+    text = TEXT.replace(PLAYS, f'[hysteresis.2]\nmodel = "bouc-wen"\nd1 = 0.02\nepsilon = -0.01\n{keys}\n')
+    assert text != TEXT
+    text = text[: text.index("[uncertainty]")]
+    if taken:
+        assert in_order(loaded(text).hysteresis)[1].alpha_1_v == alpha
+    else:
+        (fault,) = refusal(text)
+        assert (fault.key, fault.expected) == ("mirror.hysteresis.2.alpha", "above 1.125 1/V")

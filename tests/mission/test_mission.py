@@ -24,7 +24,7 @@ from made_tables import made, one_line, told
 from microrad.core import lti
 from microrad.core.units import UnitError
 from microrad.mirror import model as mirror
-from microrad.mission import toml
+from microrad.mission import model, toml
 from microrad.mission.fields import Bounded, Monthly, OrWord, ProblemsError, Quantity, Several, Share, Switch, Whole
 from microrad.mission.file import (
     MissionError,
@@ -48,7 +48,7 @@ from microrad.mission.model import (
     source_text,
 )
 from microrad.mission.tables import mirror as mirror_table
-from microrad.mission.tables.link import half_angle_rad
+from microrad.mission.tables.link import Receiver, half_angle_rad, obscuration_fits
 from microrad.mission.tables.mirror import (
     BoucWenTable,
     Comparison,
@@ -2461,3 +2461,79 @@ def test_ten_items_of_a_list_are_shown_and_ten_thousand_lines_read():
     assert shown(list(range(11))) == "[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, …]"
     assert shown(2**200 - 1) == toml.clipped(str(2**200 - 1)) and shown(-(2**200)) == "(a whole number of 201 bits)"
     assert Document.of(b"a = 1" + b"\n" * 10_000, Path("m.toml"), "mission file").data == {"a": 1}
+
+
+def coupled(**given):
+    return SimpleNamespace(
+        coupling=SimpleNamespace(**{"angular_error_rad": 0.0, "mode_radius_m": None, "is_random": False} | given),
+        wavelength_m=1.55e-6,
+    )
+
+
+@pytest.mark.parametrize(("focal_length_m", "fits"), [(0.3, False), (0.373, False), (0.374, True), (2.0, True)])
+def test_the_cone_of_a_fibre_is_held_against_the_obscuration_of_the_telescope_that_receives(focal_length_m, fits):
+    """0.3 of 0.25 m are stopped, and 2 f tan(asin 0.1) of the aperture is the fibre's."""
+    terminals = SimpleNamespace(geo_obscuration=0.3, geo_aperture_m=0.25, leo_aperture_m=0.05, leo_obscuration=0.9)
+    link_table = coupled(numerical_aperture=0.1, focal_length_m=focal_length_m)
+    found = list(model._coupling_fits(terminals, link_table, SimpleNamespace(outage=None)))
+    assert [problem.key for problem in found] == ["communication.coupling.numerical_aperture"] * (not fits)
+    open_one = SimpleNamespace(geo_obscuration=None, geo_aperture_m=0.25)
+    assert list(model._coupling_fits(open_one, link_table, SimpleNamespace(outage=None))) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "fits"), [(0.9799, False), (0.9801, True), (1.0, True), (1.0199, True), (1.0201, False)]
+)
+def test_the_point_ahead_of_a_loop_is_that_of_the_velocity_to_a_fiftieth(factor, fits):
+    fine = SimpleNamespace(reference=SimpleNamespace(point_ahead_rad=factor * 2.0 * 7500.0 / 299_792_458.0))
+    found = list(model._point_ahead_fits(SimpleNamespace(transverse_velocity_m_s=7500.0), fine))
+    assert [(problem.key, problem.expected) for problem in found] == [
+        ("fine_pointing.reference.point_ahead", 'point_ahead = "50 \u00b5rad" would do')
+    ] * (not fits)
+
+
+@pytest.mark.parametrize(("station", "turbulence", "fine", "held"), [
+    ("leo", 1, 1, True), ("geo", 1, 1, False), ("leo", None, 1, False), ("leo", 1, None, False), (None, 1, 1, False),
+])  # fmt: skip
+def test_a_loop_tracks_through_turbulence_at_a_station_that_it_stands_on(station, turbulence, fine, held):
+    path = None if station is None else SimpleNamespace(station=station)
+    mission = SimpleNamespace(channel=SimpleNamespace(turbulence=turbulence), fine_pointing=fine, path=path)
+    assert model.Mission.loop_in_turbulence.fget(mission) is held
+    mission.channel = None
+    assert model.Mission.loop_in_turbulence.fget(mission) is False
+
+
+@pytest.mark.parametrize(("comment", "kind"), [
+    ("assumption: a guess", "assumption"), ("assumption", ""), ("a paper: Table 1", ""), ("paper: a: b", "paper"),
+    ("Paper: Table 1", ""), (" paper: Table 1", ""), ("unknown:", "unknown"), ("", ""), (":", ""),
+])  # fmt: skip
+def test_a_comment_is_of_a_kind_that_stands_before_its_colon(comment, kind):
+    source = model.Source(7, comment)
+    assert (source.kind, source.text) == (kind, comment or "mission file, line 7")
+    moved = model.Source(7, comment, "2", "mirror file", '"5 cm"')
+    assert moved.text == f"mirror file, line 7, in place of 5 cm ({comment})"
+
+
+def test_sources_of_several_keys_are_said_once_in_their_order():
+    sources = {"a": model.Source(1, "paper: b"), "b": model.Source(2, ""), "c": model.Source(3, "paper: b")}
+    text = model.source_text(sources, "c", "x", "b", "a", "y")
+    assert text == "paper: b; not stated; mission file, line 2" and model.source_text(sources) == ""
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, math.nan])
+def test_counts_of_a_rate_that_is_not_known_are_not_known(rate):
+    receiver = made(Receiver, background_power_w=2e-12, efficiency=0.5, dark_count_rate_1_s=300.0)
+    photons = 0.5 * 2e-12 * 1e-6 / (6.62607015e-34 * 299_792_458.0)
+    assert receiver._counts(1e6, 1e-6) == pytest.approx((photons + 300.0) / 1e6)
+    assert receiver._counts(rate, 1e-6) is None
+    assert made(Receiver, background_power_w=None)._counts(1e6, 1e-6) is None
+
+
+@pytest.mark.parametrize(("own", "radius_m", "fits"), [
+    (0.5, 0.0115, False), (0.5, 0.0117, True), (None, 1e-4, True), (0.2, 0.005, True),
+])  # fmt: skip
+def test_a_beam_is_held_against_the_obscuration_of_the_terminal_that_it_leaves(own, radius_m, fits):
+    """Of 0.07 m: exp(-2 r^2 / w^2) is 1 % where w is 0.659 r, with r half of 0.5 times 0.07 m."""
+    terminals = SimpleNamespace(leo_obscuration=own, leo_aperture_m=0.07, geo_obscuration=0.9, geo_aperture_m=0.9)
+    found = list(obscuration_fits(terminals, SimpleNamespace(beam=SimpleNamespace(radius_m=radius_m))))
+    assert [problem.key for problem in found] == ["communication.beam.radius"] * (not fits)

@@ -358,3 +358,42 @@ def test_blanks_about_cells_and_lines_of_another_platform_change_nothing(tmp_pat
     found, plain = read_sources(path), read_sources(listed(tmp_path, *ROWS))
     assert [(each.name, each.source) for each in found] == [(each.name, each.source) for each in plain]
     assert [found[0].origin, found[1].origin] == ["ground calibration", f"{path}, row 4"]
+
+
+def budget(sources, **more):
+    """A table of a budget with sources of so many axes each, by name."""
+    required = {"one": {"index": "APE", "confidence": 0.9, "interpretation": "mixed", "axes": "x", "limit": "9 urad"}}
+    given = {
+        name: {"class": "constant", "size": size, "statistic": "fixed", "axes": "each", "gains": gains}
+        for name, (size, gains) in sources.items()
+    }
+    return ErrorBudget.model_validate({"with_loop": False, "sources": given, "requirements": required} | more)
+
+
+@pytest.mark.parametrize("order", [(1, 2), (2, 1), (3, 2), (2, 3)])
+def test_a_source_of_more_axes_or_fewer_than_the_first_is_told(order):
+    first, second = ([1.0] * count for count in order)
+    with pytest.raises(ValueError, match=r"gains has .* item.*, and others have") as refused:
+        budget({"a": ("1 urad", first), "b": ("1 urad", second), "c": ("2 urad", first)})
+    told_once = str(refused.value)
+    assert f"sources.b.gains has {order[1]} item{'s' * (order[1] > 1)}, and others have {order[0]}" in told_once
+    assert "sources.a" not in told_once and "sources.c" not in told_once
+    assert budget({"a": ("1 urad", first), "b": ("2 urad", first)}).axes == order[0]
+
+
+def test_budgets_are_one_where_all_their_numbers_are():
+    sources = {"a": ("1 urad", [1.0, 0.5]), "b": ("2 urad", [1.0, 0.0])}
+    own = budget(sources)
+    assert (own, hash(own)) == (budget(sources), hash(budget(sources)))
+    others = [
+        budget(sources | {"b": ("3 urad", [1.0, 0.0])}),
+        budget(sources | {"a": ("1 urad", [1.0, 0.25])}),
+        budget(sources, with_loop=True),
+        budget(
+            sources,
+            requirements={
+                "one": {"index": "APE", "confidence": 0.9, "interpretation": "mixed", "axes": "y", "limit": "9 urad"}
+            },
+        ),
+    ]
+    assert own not in others and len({hash(own), *map(hash, others)}) == 5
