@@ -1783,3 +1783,120 @@ def test_a_drawn_switch_is_told_as_the_file_has_it(tmp_path):
     assert told.mission.point_ahead.corrected is False
     source = told.sources["point_ahead.corrected"]
     assert (source.value, source.comment) == ("false", "campaign: drawn, false")
+def test_a_mission_that_the_middle_of_all_draws_leaves_not_is_told_of_its_cell_and_of_the_key_to_blame(tmp_path):
+    """The first cell that has none is told, whichever it is, and of two drawn keys the one that the fault names."""
+    bias = distributed("mirror.bias", 'distribution = "uniform"\nlow = "10.5 V"\nhigh = "11.5 V"')
+    for most, label in (('"12 V", "10 V", "9 V"', "10 V"), ('"9 V", "12 V", "10 V"', "9 V")):
+        grid = f'[grid]\n"mirror.drive_max" = [{most}]\n'
+        (fault,) = faults(tmp_path, HEAD + POWER + bias + grid)
+        assert fault.key == "inputs.mirror.bias"
+        assert fault.reason.startswith(
+            f"leaves no mission in the middle of all distributions of the cell mirror.drive_max = {label}: "
+            f"the row is no mission: mirror.bias = 11.0 V is outside drive_min to drive_max (0 V to {label})"
+        )
+        assert fault.expected == "distributions about a mission that works"
+
+
+def test_an_error_that_the_link_has_no_use_for_is_told_by_what_stands_in_its_place(tmp_path):
+    """Under [jitter] that is the jitter, and under a loop its runs, with [jitter] or without."""
+    error = distributed("communication.pointing_error", 'distribution = "uniform"\nlow = "1 urad"\nhigh = "2 urad"')
+    changes = (("[requirement]", JITTER + "[requirement]"),)
+    (alone,) = faults(tmp_path, HEAD + error, changes=changes)
+    assert alone.expected == (
+        "jitter.bias or jitter.rms: under the table [jitter] the margin is that of requirement.outage"
+    )
+    for more in (changes, ()):
+        (looped,) = faults(tmp_path, HEAD + LOOP + error, changes=more)
+        assert looped.key == "inputs.communication.pointing_error"
+        assert looped.expected == "a key that they depend on, or another output in `keep`"
+
+
+def test_each_value_of_a_grid_that_stands_twice_is_told_with_the_first_of_its_own(tmp_path):
+    grid = '[grid]\n"terminals.leo_aperture" = ["5 cm", "6 cm", "50 mm", "7 cm", "60 mm", "0.05 m", "7 cm"]\n'
+    assert [(fault.value, fault.reason) for fault in faults(tmp_path, HEAD + POWER + grid)] == [
+        ('"50 mm"', "stands twice, before as 5 cm"),
+        ('"60 mm"', "stands twice, before as 6 cm"),
+        ('"0.05 m"', "stands twice, before as 5 cm"),
+        ('"7 cm"', "stands twice"),
+    ]
+
+
+def test_a_fault_of_a_cell_is_told_where_its_key_stands_with_the_value_that_it_has_there(tmp_path):
+    """In [set], in [grid] or in the mission; a fault for another reason than without the grid is that of its cell."""
+    least, most = '[grid]\n"mirror.drive_max" = [{}]\n', '[set]\n"mirror.bias" = "13 V"\n'
+    (fault,) = faults(tmp_path, HEAD + POWER + most + least.format('"11 V", "11.5 V"'))
+    assert (fault.key, fault.value, Path(fault.file).name) == ("set.mirror.bias", '"13 V"', "campaign.toml")
+    assert fault.reason == ("is outside drive_min to drive_max (0 V to 11 V) (in the cell mirror.drive_max = 11 V)")
+    (fault,) = faults(tmp_path, HEAD + POWER + least.format('"12 V", "5 V"'))
+    assert (fault.key, fault.value, Path(fault.file).name) == ("mirror.bias", '"6 V"', "mission.toml")
+    assert fault.reason == "is outside drive_min to drive_max (0 V to 5 V) (in the cell mirror.drive_max = 5 V)"
+    assert fault.line > 0
+    two = '[grid]\n"mirror.drive_max" = ["12 V", "11 V"]\n"mirror.bias" = ["6 V", "11.5 V"]\n'
+    (fault,) = faults(tmp_path, HEAD + POWER + two)
+    assert (fault.key, fault.value) == ("grid.mirror.bias", '"11.5 V"')
+    assert fault.reason.endswith(" (in the cell mirror.drive_max = 11 V, mirror.bias = 11.5 V)")
+
+
+def test_a_parameter_of_the_second_of_two_identified_mirrors_is_given_by_nothing_else(tmp_path):
+    """Neither drawn by itself nor in [set]; one that neither mirror is known in may be."""
+    body = 'distribution = "uniform"\nlow = "0.5 1/V"\nhigh = "0.7 1/V"'
+    grid = '[grid]\nmirror = ["mirror.toml", "other.toml"]\n'
+    for more in (distributed("mirror.bouc_wen.beta", body), '[set]\n"mirror.bouc_wen.beta" = "0.7 1/V"\n'):
+        path = written(tmp_path, HEAD + LOOP + IDENTIFIED + grid + more)
+        own = (tmp_path / "mirror.toml").read_text(encoding="utf-8")
+        (tmp_path / "other.toml").write_text(own, encoding="utf-8")
+        assert len(load_campaign(path).inputs) == 3 + more.startswith("[inputs")
+        (tmp_path / "other.toml").write_text(own.replace('"linear.poles.1"', '"bouc_wen.beta"'), encoding="utf-8")
+        with pytest.raises(MissionError) as caught:
+            load_campaign(path)
+        assert [(fault.key, fault.reason) for fault in caught.value.faults] == [
+            ("inputs.mirror", "draws mirror.bouc_wen.beta, which the campaign gives too")
+        ]
+
+
+def test_each_input_that_its_key_does_not_take_everywhere_is_warned_of_by_what_is_drawn(tmp_path):
+    """Behind a mirror, which is never warned of; by the distribution that is drawn in place of the input's own."""
+    normal = 'distribution = "normal"\nmean = "{}"\ndeviation = "1 dB"'
+    loss = distributed("communication.implementation_loss", normal.format("2 dB"))
+    loss += distributed("communication.implementation_loss.drawn_as", normal.format("1 dB")).replace(
+        '"communication.implementation_loss.drawn_as"', '"communication.implementation_loss".drawn_as'
+    )
+    other = distributed("communication.receive_optics_loss", normal.format("1.5 dB"))
+    text = HEAD + IDENTIFIED + loss + other + '[set]\nmirror = "mirror.toml"\n'
+    said = [each.partition(":")[0] for each in loaded(tmp_path, text).warnings]
+    assert said == [
+        f"{100.0 * norm.cdf(-1.0):.3g} % of the draws of communication.implementation_loss are below 0 dB",
+        f"{100.0 * norm.cdf(-1.5):.2g} % of the draws of communication.receive_optics_loss are below 0 dB",
+    ]
+
+
+def test_a_parameter_of_two_mirrors_is_told_by_the_first_and_one_of_the_second_alone_by_that(tmp_path):
+    path = written(tmp_path, HEAD + IDENTIFIED + '[grid]\nmirror = ["mirror.toml", "other.toml"]\n')
+    other = (tmp_path / "mirror.toml").read_text(encoding="utf-8").partition("[uncertainty]")[0]
+    other += '[uncertainty]\nparameters = ["linear.poles.1", "bouc_wen.beta"]\nstandard_errors = [0.05, 0.0725]\n'
+    (tmp_path / "other.toml").write_text(other, encoding="utf-8")
+    assert [(each.key, each.unit, each.distribution) for each in load_campaign(path).inputs] == [
+        ("mirror.bouc_wen.d1", "rad/V", "identified, standard error 2 %"),
+        ("mirror.bouc_wen.alpha", "1/V", "identified, standard error 3 %"),
+        ("mirror.linear.poles.1", "Hz", "identified, standard error 1 %"),
+        ("mirror.bouc_wen.beta", "1/V", "identified, standard error 7.25 %"),
+    ]
+
+
+def test_a_key_in_three_tables_is_told_twice_with_the_first_of_them(tmp_path):
+    own = '[set]\n"communication.transmit_power" = "4 W"\n[grid]\n"communication.transmit_power" = ["3 W", "2 W"]\n'
+    told = [(fault.key, fault.reason) for fault in faults(tmp_path, HEAD + POWER + own)]
+    assert told == [
+        ("inputs.communication.transmit_power", "stands in [set] too"),
+        ("grid.communication.transmit_power", "stands in [set] too"),
+    ]
+
+
+def test_an_item_may_be_drawn_of_a_list_that_stands_in_a_grid(tmp_path):
+    """It is put into the list of each cell, whose other items stay."""
+    grid = '[grid]\n"jitter.rms" = [["3 urad", "4 urad"], ["5 urad", "6 urad"]]\n'
+    drawn = distributed("jitter.rms.2", 'distribution = "uniform"\nlow = "1 urad"\nhigh = "2 urad"')
+    found = loaded(tmp_path, HEAD + drawn + grid, changes=(("[requirement]", JITTER + "[requirement]"),))
+    builder = MissionBuilder(found)
+    rows = [builder.mission(cell, {"jitter.rms.2": 1.5e-6}).mission.jitter.rms_rad for cell in (0, 1)]
+    assert rows == [(3e-6, 1.5e-6), (5e-6, 1.5e-6)]

@@ -682,3 +682,18 @@ def test_what_does_not_fit_in_a_row_is_told_with_its_drawn_value_where_it_has_on
     with pytest.raises(CampaignError) as refused:
         builder.mission(0, drawn)
     assert str(refused.value) == f"the row is no mission: {words}"
+
+
+def test_each_series_of_a_grid_has_to_be_one_that_can_be_used(tmp_path):
+    """The second of two is too short."""
+    faded(tmp_path)
+    np.savetxt(tmp_path / "short.csv", np.ones(20), header="power", comments="")
+    keep = HEAD + 'keep = ["margin", "margin_under_fades"]\n'
+    grid = '[grid]\n"communication.fading.series" = ["fades.csv", "{}"]\n'
+    (found,) = faults(tmp_path, "faded", POWER + grid.format("short.csv"), keep)
+    assert (found.key, found.expected) == ("keep", "a series that can be used, or this output left out")
+    assert found.reason.startswith("needs communication.fading: ")
+    assert "short.csv: the series has 20 samples; from 200" in found.reason
+    (found,) = faults(tmp_path, "faded", POWER + grid.format("none.csv"), keep)
+    assert (found.key, found.reason) == ("mission", "is named by the mission and does not exist")
+    assert "none.csv" in found.value

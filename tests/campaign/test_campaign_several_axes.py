@@ -230,3 +230,29 @@ def test_a_mirror_of_each_cell_has_its_own_covariance(tmp_path):
     for mirror in drawn_mirrors(campaign, 12, 1):
         decay, frequency, *rest = known_values(mirror)
         assert decay != 18.0 and frequency != 900.0 and tuple(rest) == known_values(two_axes())[2:]
+
+
+@pytest.mark.parametrize("order", ['"f.toml", "mirror.toml"', '"mirror.toml", "f.toml"'])
+def test_the_numbers_of_a_row_are_told_by_the_first_mirror_that_has_them(tmp_path, order):
+    """Two cells, one known in two directions and one in four, either way round."""
+    fewer = WITHOUT + (
+        '[uncertainty]\nparameters = ["modes.decay.1", "modes.frequency.1"]\nstandard_errors = [0.4, 0.9]\n'
+    )
+    path = written(tmp_path, SMALL + LOOP + IDENTIFIED + f'[grid]\n"fine_pointing.mirror_file" = [{order}]\n')
+    (tmp_path / "f.toml").write_text(fewer, encoding="utf-8")
+    few = 2 if order.startswith('"f') else 4
+    assert [(each.key, each.unit, each.distribution) for each in load_campaign(path).inputs] == [
+        (f"mirror.{number}", "", f"identified, {number} of {of} standard normal numbers for {of} parameters")
+        for number, of in ((1, few), (2, few), (3, 4), (4, 4))
+    ]
+
+
+def test_the_mirror_of_the_second_cell_has_to_be_known_too(tmp_path):
+    path = written(
+        tmp_path, SMALL + LOOP + IDENTIFIED + '[grid]\n"fine_pointing.mirror_file" = ["mirror.toml", "w.toml"]\n'
+    )
+    (tmp_path / "w.toml").write_text(WITHOUT.replace("Two axes", "Another two axes"), encoding="utf-8")
+    with pytest.raises(MissionError) as caught:
+        load_campaign(path)
+    assert [fault.key for fault in caught.value.faults] == ["inputs.mirror"]
+    assert 'the mirror "Another two axes on a hysteretic spring" has no table uncertainty' in str(caught.value)
