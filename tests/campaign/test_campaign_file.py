@@ -21,7 +21,7 @@ from microrad.campaign import file as campaign_file
 from microrad.campaign.definition import cells, draws, keys
 from microrad.campaign.definition.distributions import OneOf, uncovered
 from microrad.campaign.definition.outputs import OUTPUTS
-from microrad.campaign.definition.reader import block_rows
+from microrad.campaign.definition.reader import block_rows, read_definition
 from microrad.campaign.definition.records import Variable
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import file
@@ -1900,3 +1900,21 @@ def test_an_item_may_be_drawn_of_a_list_that_stands_in_a_grid(tmp_path):
     builder = MissionBuilder(found)
     rows = [builder.mission(cell, {"jitter.rms.2": 1.5e-6}).mission.jitter.rms_rad for cell in (0, 1)]
     assert rows == [(3e-6, 1.5e-6), (5e-6, 1.5e-6)]
+
+
+def test_a_file_that_is_drawn_by_an_absolute_path_does_not_go_to_a_worker(tmp_path):
+    """The second of two values; by relative paths both go along."""
+    changes = (('\nspectrum = "olympus"', '\nspectrum = "table"\nfile = "a.csv"'),)
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("Hz, urad^2/Hz\n1, 1\n2, 1\n", encoding="utf-8")
+    drawn = '[inputs."fine_pointing.vibration.file"]\ndistribution = "table"\nvalues = ["a.csv", "{}b.csv"]\n'
+    absolute, beside = (
+        read_definition(written(tmp_path, HEAD + LOOP + drawn.format(where), changes=changes))[0]
+        for where in (f"{tmp_path}/", "")
+    )
+    with pytest.raises(CampaignError, match=rf"campaign\.toml depends on {tmp_path}/b\.csv, an absolute path"):
+        bundle.packed(absolute, ())
+    found = bundle.opened(bundle.packed(beside, ())).campaign
+    names = ["campaign.toml", "mission.toml", "a.csv", "b.csv"]
+    assert [file.name for file in found.files] == names
+    assert all(file.is_file() and file.parent != tmp_path for file in found.files)

@@ -697,3 +697,16 @@ def test_each_series_of_a_grid_has_to_be_one_that_can_be_used(tmp_path):
     (found,) = faults(tmp_path, "faded", POWER + grid.format("none.csv"), keep)
     assert (found.key, found.reason) == ("mission", "is named by the mission and does not exist")
     assert "none.csv" in found.value
+
+
+def test_a_list_that_is_drawn_as_one_number_has_the_proportions_of_its_own_cell(builder):
+    """Cells of unlike lists, asked in turn; an item by itself leaves the others of its cell."""
+    key = "scenario.pid_frequencies"
+    first, second = builder._cells
+    other = replace(second, data=put(second.data, key, ["2 Hz", "4 Hz", "8 Hz"]))
+    made = MissionBuilder(SimpleNamespace(cells=(first, other), draws=()))
+    for cell, largest, found in ((0, 22.5, (1.5, 22.5)), (1, 16.0, (4.0, 8.0, 16.0)), (0, 7.5, (0.5, 7.5))):
+        assert made.mission(cell, {key: largest}).mission.scenario.pid_frequencies_hz == pytest.approx(found)
+    drawn = {f"{key}.1": 3.0, f"{key}.2": 5.0}
+    assert made.mission(1, drawn).mission.scenario.pid_frequencies_hz == (3.0, 5.0, 8.0)
+    assert made.mission(0, drawn).mission.scenario.pid_frequencies_hz == (3.0, 5.0)

@@ -1808,3 +1808,25 @@ def test_the_time_of_this_sitting_is_noted_when_it_ends():
     made.pace.began_s -= 1.0
     made._note("stopped")
     assert book.noted["seconds"] >= 31.0 and book.noted["state"] == "stopped"
+
+
+@pytest.mark.parametrize("noted", [{}, {"file": "gone.toml"}, {"file": "."}])
+def test_a_campaign_whose_file_is_not_there_goes_on_with_the_one_in_its_ledger(monkeypatch, tmp_path, noted):
+    """Nothing was noted, the file is gone, or a folder has its name by now."""
+    monkeypatch.chdir(tmp_path)
+    kept, asked = SimpleNamespace(table=SimpleNamespace(row_limit_s=5.0)), []
+    book = SimpleNamespace(head=SimpleNamespace(bundle=b"kept", hashes={"code": "x"}), notes=lambda: noted)
+    for name, fake in {
+        "verify": lambda path: SimpleNamespace(sound=True),
+        "Ledger": SimpleNamespace(open=lambda path, write: nullcontext(book)),
+        "load_campaign": asked.append,
+        "check_same": lambda *given: asked.append(given),
+        "_Runner": lambda *given: SimpleNamespace(run=lambda: asked.append(given[0])),
+        "sweep_scratch": lambda name: None,
+    }.items():
+        monkeypatch.setattr(run, name, fake)
+    monkeypatch.setattr(run.bundle, "opened", lambda spec, any_code: SimpleNamespace(campaign=kept))
+    monkeypatch.setattr(run.bundle, "hashes", lambda of: {"of": of})
+    means = SimpleNamespace(engine=lambda spec, late_s: SimpleNamespace(close=lambda: None))
+    run.resume_campaign(tmp_path / "a.ledger", means)
+    assert asked == [({"code": "x"}, {"of": kept}, tmp_path / "a.ledger"), kept]

@@ -1,6 +1,7 @@
 """Statistics of rows: quantiles against those of NumPy, and every interval against how often it holds the truth."""
 
 import math
+import re
 from contextlib import nullcontext
 from dataclasses import astuple, replace
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from microrad.campaign.definition.outputs import OUTPUTS
-from microrad.campaign.records import Chunk, Failed, Limit, Progress
+from microrad.campaign.records import Chunk, Failed, Interval, Limit, Progress
 from microrad.campaign.statistics import interim, summary, tails
 from microrad.campaign.statistics.cell import CellRows, _missed
 from microrad.campaign.statistics.interim import _order
@@ -28,6 +29,7 @@ from microrad.campaign.statistics.intervals import (
     quantile_interval,
     share_interval,
 )
+from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.campaign.statistics.summary import _sample, progress
 from microrad.core.arrays import Floats
 from microrad.core.intervals import binomial_band, counted, student
@@ -963,3 +965,51 @@ def test_a_share_of_a_precision_is_told_with_every_digit_that_it_has(share, told
     campaign.table.precision = SimpleNamespace(output="data_rate", quantile=share, confidence=share)
     words = CellRows(campaign, 0, [a_chunk(0, range(400), data_rate=1e8 + np.arange(400.0))]).precision_words()
     assert words.startswith(f"{told} quantile of ") and f" at {told} confidence; " in words
+
+
+def test_rows_of_unlike_weights_miss_their_limits_and_know_their_quantile_by_their_weight() -> None:
+    limits = (Limit("margin", 3.0, None, ""), Limit("outage", None, 0.5, ""))
+    campaign = a_campaign(("margin", "outage"), limits=limits, half_width=1.0)
+    campaign.table.precision = SimpleNamespace(output="margin", quantile=0.5, confidence=0.5)
+    weight = [0.25, 3.0, 0.25, 0.5]
+    chunk = a_chunk(0, range(4), weight=weight, margin=[2.0, 4.0, 5.0, 1.0], outage=[0.0, 0.0, 0.75, 0.75])
+    found = CellRows(campaign, 0, [chunk]).summary((0.5,))
+    assert found.missed.value == pytest.approx(1.0 / 4.0)  # rows 0, 2 and 3
+    shares = {name: each.value for name, each in found.missed_by.items()}
+    assert shares == pytest.approx({"margin": 0.75 / 4.0, "outage": 0.75 / 4.0})
+    assert found.outputs["margin"].quantiles[0.5].value == 4.0  # of equal rows it would be 2
+    assert found.outputs["margin"].mean.value == pytest.approx((0.5 + 12.0 + 1.25 + 0.5) / 4.0)
+    many = a_chunk(0, range(400), weight=np.tile(weight, 100), margin=np.tile([2.0, 4.0, 5.0, 1.0], 100))
+    cell = CellRows(campaign, 1, [many])
+    assert cell.is_precise()
+    assert cell.precision_words().startswith(
+        "50 % quantile of margin: 4 dB, 4 dB to 4 dB at 50 % confidence; as precise"
+    )
+
+
+def test_a_radius_is_told_with_its_cell_and_with_what_is_not_known_of_it(monkeypatch) -> None:
+    wanted = {0.125: Interval(2e-5, 1.5e-5, math.nan, 0.8)}
+    monkeypatch.setattr(tails, "tail_of_time", lambda *given: SimpleNamespace(wanted=wanted))
+    campaign = a_campaign(half_width=2.5e-6)
+    campaign.cells[1].values = {"a.b": "1 W", "c": "x"}
+    campaign.table.precision = SimpleNamespace(output="radius", quantile=0.875, confidence=0.8)
+    cell = CellRows(campaign, 1, [a_chunk(0, range(3), margin=[1, 2, 3], survival=[1.0])])
+    told = "87.5 % quantile of radius with a.b = 1 W with c = x: 20 µrad, 15 µrad to {} at 80 % confidence; {} as asked"
+    assert cell.precision_words() == f"{told.format('unknown', 'NOT as precise')} for (± 2.5 µrad)."
+    assert not cell.is_precise()
+    wanted[0.125] = Interval(1.75e-5, 1.5e-5, 1.8e-5, 0.8)
+    assert cell.precision_words() == (
+        f"{told.replace('20 µrad', '17.5 µrad').format('18 µrad', 'as precise')} for (± 2.5 µrad)."
+    )
+    assert cell.is_precise()
+
+
+def test_inputs_that_go_against_each_other_are_not_independent_either() -> None:
+    """Of four inputs of which one is held, behind a pair that goes together less."""
+    x = philox(35).random((300, 3))
+    inputs = {"a": x[:, 0], "held": np.ones(300), "b": 0.3 * x[:, 0] + x[:, 1], "c": 0.1 * x[:, 2] - x[:, 1]}
+    found = sensitivity(inputs, x[:, 0] + x[:, 2], "y")
+    assert found.total == {}
+    assert re.fullmatch(r"no total indices: b and c are not independent \(rank correlation -0\.9\d\)", found.note), (
+        found.note
+    )

@@ -1,6 +1,7 @@
 """The verdict by other readings: each against the mission that is written so."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -85,3 +86,48 @@ def test_a_loop_that_cannot_be_run_so_says_why(monkeypatch):
     failed = made["mirror.composition", "additive"]
     assert failed.failure == "the loop is unstable" and math.isnan(failed.residual_rad) and not failed.closes
     assert made["conventions.residual", "radial"].failure == ""
+
+
+def test_each_reading_is_judged_by_its_own_conventions_on_the_run_that_it_asks_for(tmp_path, monkeypatch):
+    """Of a mission with neither default: rms, radial; the loop runs anew for readings of the mirror alone."""
+    m = edited(
+        tmp_path,
+        ('residual = "per-axis"', 'residual = "radial"'),
+        ('statistic = "peak"', 'statistic = "rms"'),
+        ('strehl = "decibel"', 'strehl = "ratio"'),
+    )
+    read = readings.paper_cases
+
+    def left(q, conventions, trace):
+        asked.append((q.residual_statistic, conventions.residual, trace))
+        return float(len(asked))
+
+    asked, linked = [], []
+    monkeypatch.setattr(readings.mirror, "of", lambda of: of.conventions.mirror_angle)
+    monkeypatch.setattr(read, "of", lambda of, parts: (of.mirror.composition, parts))
+    monkeypatch.setattr(readings, "_largest", lambda cases, statistic: SimpleNamespace(trace=(*cases, statistic)))
+    monkeypatch.setattr(read, "residual_rad", left)
+    monkeypatch.setattr(readings.link, "of", lambda of: (of.conventions.pointing_loss, of.conventions.strehl))
+    monkeypatch.setattr(readings.link, "margin_of_error", lambda data, error: linked.append((data, error)) or -error)
+    made = readings.other_readings(m, SimpleNamespace(trace="own"))
+    assert [(r.key.partition(".")[2], r.given, r.other) for r in made] == [
+        ("residual", "radial", "per-axis"),
+        ("pointing_loss", "gaussian", "gain"),
+        ("strehl", "ratio", "decibel"),
+        ("mirror_angle", "line-of-sight", "optical"),
+        ("mirror_angle", "line-of-sight", "mechanical"),
+        ("residual_statistic", "rms", "peak"),
+        ("composition", "cascade", "additive"),
+    ]
+    assert asked == [
+        ("rms", "per-axis", "own"),
+        ("rms", "radial", "own"),
+        ("rms", "radial", "own"),
+        ("rms", "radial", ("cascade", "optical", "rms")),
+        ("rms", "radial", ("cascade", "mechanical", "rms")),
+        ("peak", "radial", "own"),
+        ("rms", "radial", ("additive", "line-of-sight", "rms")),
+    ]
+    links = [("gaussian", "ratio"), ("gain", "ratio"), ("gaussian", "decibel"), *[("gaussian", "ratio")] * 4]
+    assert linked == [(data, place) for place, data in enumerate(links, 1)]
+    assert [(r.residual_rad, r.margin_db, r.failure) for r in made] == [(k, -k, "") for k in range(1, 8)]

@@ -691,3 +691,152 @@ def test_parts_that_are_kept_are_those_of_the_day_its_contact_and_its_constellat
     assert plan == (study.constellation.run_constellation, file, "loss")
     asked = SimpleNamespace(with_loop=False)
     assert study.pointing_errors(asked, None, parts) == (study.error_budget.judge, asked, None)
+
+
+class Given(str):
+    """Something that tells by whom it was made of what, with a few attributes."""
+
+    def __new__(cls, text, **attributes):
+        found = super().__new__(cls, text)
+        found.__dict__.update(attributes)
+        return found
+
+
+def told(name):
+    """A function that gives its name and what it is given."""
+    return lambda *given, **named: Given(f"{name}({', '.join(map(str, (*given, *named.values())))})")
+
+
+def a_study_of_names(monkeypatch, *, fine, comparison, errors=None, content="whole", broken=()):
+    """`run_study` of a mission with each function that it asks in name alone; what it gave, and its progress."""
+    conventions = Given("conventions", residual="radial")
+    m = SimpleNamespace(
+        requirement=Given("q", residual_statistic="rms"),
+        error_budget=None if errors is None else "table",
+        fine_pointing="loop" if fine else None,
+        conventions=conventions,
+        mirror=Given("m.mirror", comparison="model" if comparison else None),
+        amplifier="amplifier",
+    )
+    file = Given("file", mission=m, sources="sources", contents=(Given("a", content="x"), Given("b", content=content)))
+    run, other = (Given(name, trace=Given(f"{name}.trace", name=f"{name} of 15 Hz")) for name in ("worst", "compared"))
+    case = Given("case", error_rad="error", outage_loss_db=2.0, outage=0.25, controller="LQG", source="noise")
+    links = Given("links", data="data")
+
+    def raising(name):
+        def fails(*given, **named):
+            raise ValueError(name)
+
+        return fails
+
+    given = {
+        study: ("margin_map", "fine_pointing_loop", "pointing_errors", "tornado"),
+        study.link: ("tracking_light_w", "arrival_of", "communication_budget"),
+        study.mirror: ("of",),
+        study.paper_cases: ("of", "residual_rad"),
+        study.alternatives: ("other_readings",),
+        study.coupled_study: ("of_mission",),
+        study.mirror_summary: ("summarise",),
+        study.pointing_penalty: ("performance_of_loops",),
+        study.verdict: ("residual_cause", "of_residual", "Evidence", "against_paper"),
+        study.day_study: ("PointingLoss", "loss_at"),
+        study.paper: ("scan",),
+    }
+    for module, names in given.items():
+        for name in names:
+            monkeypatch.setattr(module, name, told(name))
+    budget = told("budget")
+    for module, name, fake in (
+        (study.link_study, "solve_rate", lambda of: of),
+        (study, "with_contents", lambda of: of),
+        (study.error_budget, "of_mission", lambda table, sources: Given(f"asked({table})", with_loop=errors)),
+        (study.link_study, "run_link_study", lambda of, parts: links),
+        (study.ensemble, "compile_in_background", lambda loop: lambda: None),
+        (study.paper_cases, "simulate", lambda cases: ("loops", "margins", "runs")),
+        (study.paper_cases, "worst", lambda runs, statistic, of=None: run if of is None else other),
+        (study.paper, "applies", lambda of: comparison),
+        (
+            study.link,
+            "margin_of_error",
+            lambda data, error: {"residual_rad(q, conventions, compared.trace)": 5.5}[error],
+        ),
+        (study, "best_case", lambda found, of: None if of is None else case),
+        (study, "judged", lambda *of: ((told("judged")(*of),), ("papers",))),
+        (study.verdict, "of_error_budget", lambda *of: (told("of_error_budget")(*of),)),
+        (
+            study,
+            "delivered",
+            lambda *of: tuple(f"{name}: {told('delivered')(*of)}" for name in ("day", "contact", "plan")),
+        ),
+        (study.link, "communication_budget", lambda *of, **how: Given(budget(*of, **how), margin_db="m")),
+    ):
+        monkeypatch.setattr(module, name, fake)
+    for module, name in broken:
+        monkeypatch.setattr(module, name, raising(name))
+    steps = []
+    parts = Given("kept", part=lambda of, *args, **named: of(*args, **named))
+    nothing = Given("nothing", part=lambda of, *args, **named: of(*args, **named))
+    monkeypatch.setattr(study.kept, "NOTHING", nothing)
+    progress = Given("progress")
+    told_of = type("Told", (), {"__call__": lambda self, *step: steps.append(step), "__str__": lambda self: progress})()
+    return study.run_study(file, told_of, parts), steps
+
+
+LEFT = "residual_rad(q, conventions, worst.trace)"
+READ = f"budget(data, sources, {LEFT}, simulated: worst of 15 Hz, rms (radial))"
+FLOWN = "fine_pointing_loop(of_mission(file, of({m}), tracking_light_w(file), arrival_of(file)), {parts}, progress)"
+
+
+def test_a_study_without_a_loop_of_its_own_rests_on_the_residual_of_the_papers_loop(monkeypatch):
+    found, steps = a_study_of_names(monkeypatch, fine=False, comparison=False)
+    m = found.file.mission
+    mirrors, cases = f"of({m})", f"of({m}, of({m}))"
+    cause = f"residual_cause({mirrors}, rms, worst, runs)"
+    assert (found.links, found.loops, found.margins, found.runs) == ("links", "loops", "margins", "runs")
+    assert (found.residual, found.achieved, found.margin_map) == ("worst", READ, "margin_map(data, sources)")
+    assert found.other_readings == f"other_readings({m}, worst, kept)"
+    assert (found.comparison, found.scan, found.fine_pointing, found.error_budget) == (None,) * 4
+    assert found.performance == "performance_of_loops(data, radial, runs, None)"
+    by_paper = f"of_residual(q, {mirrors}, sources, {READ}, {LEFT}, {cause})"
+    assert (found.requirements, found.papers_loop) == ((f"judged(links, {by_paper}, None, None)",), ("papers",))
+    loss = "loss_at(data, m, simulated: worst of 15 Hz)"
+    assert (found.day, found.contact, found.plan) == tuple(
+        f"{name}: delivered(links, {loss}, None, kept)" for name in ("day", "contact", "plan")
+    )
+    assert found.tornado == f"tornado(links, {LEFT})"
+    summary = "summarise(m.mirror)"
+    assert found.summary == summary
+    evidence = f"Evidence(amplifier, {cases}, loops, {summary}, runs, None, {found.day})"
+    assert found.claims == f"against_paper({evidence})"
+    assert steps == [
+        (0, 3, "budgets, acquisition, mirror and tracking"),
+        (1, 3, "claims of the paper"),
+        (2, 3, "the day"),
+        (3, 3, "verdict"),
+    ]
+
+
+@pytest.mark.parametrize(("with_loop", "content"), [(True, "whole"), (False, None)])
+def test_a_study_with_a_loop_of_its_own_is_judged_by_its_best_controller(monkeypatch, with_loop, content):
+    """What is kept of earlier studies is left alone where one of the files could not be read."""
+    found, _ = a_study_of_names(monkeypatch, fine=True, comparison=True, errors=with_loop, content=content)
+    m, parts = found.file.mission, "kept" if content else "nothing"
+    flown = FLOWN.format(m=m, parts=parts)
+    assert found.fine_pointing == flown
+    assert found.comparison == study.Comparison("compared", 5.5)
+    assert found.scan == f"scan(of({m}, of({m})), progress)"
+    assert found.performance == f"performance_of_loops(data, radial, runs, {flown})"
+    assert found.error_budget == f"pointing_errors(asked(table), {flown}, {parts})"
+    judged, errors = found.requirements
+    assert judged.endswith(f", {flown}, case)") and found.papers_loop == ("papers",)
+    assert errors == f"of_error_budget({found.error_budget}, sources, {flown if with_loop else None})"
+    assert found.day == f"day: delivered(links, PointingLoss(2.0, 0.25, LQG, noise), {flown}, {parts})"
+    assert found.tornado == "tornado(links, error)"
+    assert found.other_readings == f"other_readings({m}, worst, {parts})"
+
+
+def test_what_is_wrong_with_the_links_is_said_before_what_is_wrong_with_the_loop(monkeypatch):
+    links, loop = (study.link_study, "run_link_study"), (study, "fine_pointing_loop")
+    for broken, said in (((links, loop), "run_link_study"), ((loop,), "fine_pointing_loop"), ((links,), links[1])):
+        with monkeypatch.context() as patch, pytest.raises(ValueError, match=f"^{said}$"):
+            a_study_of_names(patch, fine=True, comparison=True, broken=broken)
