@@ -1914,7 +1914,7 @@ def test_a_file_that_is_drawn_by_an_absolute_path_does_not_go_to_a_worker(tmp_pa
     )
     with pytest.raises(CampaignError, match=rf"campaign\.toml depends on {tmp_path}/b\.csv, an absolute path"):
         bundle.packed(absolute, ())
-    found = bundle.opened(bundle.packed(beside, ())).campaign
+    found = bundle.opened(bundle.packed(beside, ()))
     names = ["campaign.toml", "mission.toml", "a.csv", "b.csv"]
-    assert [file.name for file in found.files] == names
-    assert all(file.is_file() and file.parent != tmp_path for file in found.files)
+    assert [file.name for file in found.campaign.files] == names
+    assert all(file.is_file() and file.parent != tmp_path for file in found.campaign.files)
