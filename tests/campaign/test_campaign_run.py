@@ -1830,3 +1830,52 @@ def test_a_campaign_whose_file_is_not_there_goes_on_with_the_one_in_its_ledger(m
     means = SimpleNamespace(engine=lambda spec, late_s: SimpleNamespace(close=lambda: None))
     run.resume_campaign(tmp_path / "a.ledger", means)
     assert asked == [({"code": "x"}, {"of": kept}, tmp_path / "a.ledger"), kept]
+
+
+def test_each_cell_has_a_controller_and_a_proposal_of_its_own_mission_with_what_all_rows_have(monkeypatch):
+    """Both are made once for each cell, in whatever order the cells are asked for."""
+    made, asked = object.__new__(Evaluator), []
+    made.fixed, made.controllers = {"power": 2.5}, {0: "tuned 0", 1: "tuned 1"}
+    made._cell_controllers, made._proposals = {}, {}
+    made.campaign = SimpleNamespace(table=SimpleNamespace(tail=SimpleNamespace(error_rad=7e-6)))
+    made.builder = SimpleNamespace(mission=lambda cell, values: f"mission {cell} {values}")
+    made._loop = lambda file: SimpleNamespace(
+        controller=lambda tuned: f"{tuned} on {file}", row=f"row of {file}", span=f"span of {file}"
+    )
+    monkeypatch.setattr(evaluator.importance_sampling, "proposal", lambda *given: asked.append(given) or given)
+    own = [f"mission {cell} {{'power': 2.5}}" for cell in (0, 1)]
+    for cell in (1, 0, 1):
+        controller = f"tuned {cell} on {own[cell]}"
+        wanted = (f"row of {own[cell]}", controller, f"span of {own[cell]}", 7e-6)
+        assert made._proposal(cell) == wanted and made.controller(cell) == controller
+        assert made._proposal(cell) is made._proposal(cell)
+    assert len(asked) == 2
+
+
+def test_rows_are_drawn_with_what_all_have_and_each_keeps_its_mission_mirror_and_loop(monkeypatch):
+    """Of three rows from 40 on the second is no mission; its mirror and its loop are known all the same."""
+    made, asked = object.__new__(Evaluator), []
+    made.campaign, made.fixed = "campaign", {"aperture": 0.5}
+    columns, weight = (
+        {"power": np.array([1.0, 2.0, 4.0]), "loss": np.array([8.0, 16.0, 32.0])},
+        np.array([1.0, 0.5, 2.0]),
+    )
+    monkeypatch.setattr(evaluator.sampling, "rows", lambda *given: asked.append(given) or (columns, weight))
+
+    def mission(cell, values):
+        if values["power"] == 2.0:
+            raise CampaignError(f"no mission of cell {cell}")
+        return f"mission {cell} {values}"
+
+    made.builder = SimpleNamespace(
+        mission=mission,
+        several_axes=lambda cell, values: f"mirror {cell} {values['loss']}",
+        loop_key=lambda cell, values: (cell, *values.items()),
+    )
+    found = made._drawn(3, range(40, 43))
+    assert asked == [("campaign", 3, 40, 3)]
+    assert (found.cell, found.first, found.columns, found.weight) == (3, 40, columns, weight)
+    values = [{"aperture": 0.5, "power": p, "loss": 8.0 * p} for p in (1.0, 2.0, 4.0)]
+    assert found.files == [f"mission 3 {values[0]}", "no mission of cell 3", f"mission 3 {values[2]}"]
+    assert found.mirrors == ["mirror 3 8.0", "mirror 3 16.0", "mirror 3 32.0"]
+    assert found.keys == [(3, *each.items()) for each in values]

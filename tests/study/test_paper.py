@@ -1,6 +1,7 @@
 """The search for gains with which the paper's closed-loop claims hold, against single runs of the loop."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -188,3 +189,50 @@ POINT = paper.Point(
 ])  # fmt: skip
 def test_a_point_of_the_scan_holds_claims_up_to_their_limits(found, expected):
     assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("own", "steps", "delay", "wanted"), [("cascade", 7, 2, 1), ("additive", 6, 14, 3), ("additive", 3, 0, 0)]
+)
+def test_each_point_of_a_scan_has_its_composition_and_its_gains_at_whole_periods_of_delay(
+    monkeypatch, own, steps, delay, wanted
+):
+    """A delay that is no whole number of periods is longer, and a plant of the mission's own composition is taken."""
+    monkeypatch.setattr(paper, "PROPORTIONAL_V_MRAD", (0.0, 4.0))
+    monkeypatch.setattr(paper, "INTEGRAL_V_MRAD_S", (5.0, 3.0, 9.0))
+    monkeypatch.setattr(paper, "_point", lambda *given: given)
+    monkeypatch.setattr(paper.mirror, "from_mission", lambda *given: given)
+    sight = {
+        v: SimpleNamespace(plant=f"own {v}", model=f"model {v}") for v in (paper.Variant.GIVEN, paper.Variant.STRAIGHT)
+    }
+    table = SimpleNamespace(composition=own)
+    mirrors = SimpleNamespace(table=table, line_of_sight=sight, line_of_sight_per_own=2.0)
+    timing = control.Timing(7e-4, steps, delay)
+    cases = SimpleNamespace(setup=SimpleNamespace(timing=timing), mirrors=mirrors)
+
+    def plant(variant, composition):
+        return f"own {variant}" if composition == own else (table, f"model {variant}", composition, 2.0)
+
+    coarse = control.Timing(7e-4, 1, wanted)
+    assert paper.scan(cases).points == tuple(
+        (cases, coarse, plant("no hysteresis", "cascade"), plant("given", composition), composition, kp, ki)
+        for composition in ("cascade", "additive")
+        for kp in (0.0, 4.0)
+        for ki in (5.0, 3.0, 9.0)
+    )
+
+
+def test_of_sets_of_claims_of_one_size_the_first_counts_with_all_points_that_hold_it():
+    few, first, other = (
+        point(added_rms={1.0: 1.8e-6, 15.0: 1.7e-6}, pid_peak={15.0: 22.6e-6, 25.0: 35e-6}),
+        point(pid_peak={15.0: 20e-6, 25.0: 29e-6}),
+        point(pid_peak={15.0: 22.6e-6, 25.0: 35e-6}),
+    )
+    again, more = replace(first, integral_v_rad_s=9e6), point()
+    claims = tuple(paper.CLAIMS)
+    names, points = paper.Scan((few, first, other, again)).together()
+    assert (names, points) == (claims[:3], (first, again))
+    names, points = paper.Scan((few, other, first)).together()
+    assert (names, points) == ((*claims[:2], claims[3]), (other,))
+    assert paper.Scan((few, first, other, again, more)).together() == (claims[:4], (more,))
+    assert paper.Scan((few, first, other)).holding(claims[3:4]) == (few, other)
