@@ -13,6 +13,7 @@ import textwrap
 import threading
 import time
 from itertools import islice
+from queue import Empty
 from types import SimpleNamespace
 
 import psutil
@@ -1092,3 +1093,109 @@ def test_a_client_that_has_just_closed_is_a_scheduler_that_is_gone():
     with pytest.raises(CampaignError, match=r"^the scheduler at tcp://here is gone \(.*the client has closed\)$"):
         list(engine.outcomes(iter([Job(0, 1)])))
     assert (engine._flights, engine._futures) == ({}, {})
+
+
+def test_a_worker_is_started_with_its_target_one_thread_of_sums_and_a_folder_of_its_own(monkeypatch, tmp_path):
+    """Whatever the environment says of threads and folders; the rest is passed on, and the folder goes at last."""
+    asked, ended = [], []
+
+    def started(command, **how):
+        asked.append((command, how))
+        streams = {name: io.BytesIO() for name in ("stdin", "stdout", "stderr")}
+        return SimpleNamespace(kill=lambda: ended.append("kill"), wait=lambda: ended.append("wait"), **streams)
+
+    (tmp_path / "own").mkdir()
+    monkeypatch.setattr(local, "scratch_folder", lambda name: tmp_path / "own")
+    monkeypatch.setattr(local.subprocess, "Popen", started)
+    for name, value in (("OMP_NUM_THREADS", "4"), ("OPENBLAS_NUM_THREADS", "8"), ("TMPDIR", "/other"), ("OURS", "x")):
+        monkeypatch.setenv(name, value)
+    said = []
+    process = local._WorkerProcess(
+        "m:f", 330.5, SimpleNamespace(now=lambda: 7.0), SimpleNamespace(put=lambda each: said.append(each[1]))
+    )
+    ((command, how),) = asked
+    module = ["-m", "microrad.campaign.engines.worker", "m:f", "330.5", str(os.getpid())]
+    assert command == [sys.executable, "-P", "-X", "faulthandler", *module]
+    assert {how[name] for name in ("stdin", "stdout", "stderr")} == {local.subprocess.PIPE}
+    threads, folders = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), ("TMPDIR", "TEMP", "TMP")
+    own = dict.fromkeys(threads, "1") | dict.fromkeys(folders, str(tmp_path / "own"))
+    assert how["env"] == {**os.environ, **own}
+    assert (process.job, process.begun, process.ready, process.heard_s) == (None, False, False, 7.0)
+    process.kill()
+    assert (ended, said) == (["kill", "wait"], [None]), "its end is heard once"
+    assert process.process.stdin.closed and not (tmp_path / "own").exists()
+
+
+def test_jobs_go_to_idle_workers_first_and_then_to_new_ones_up_to_as_many_as_are_allowed(monkeypatch):
+    made = []
+
+    class Process:
+        def __init__(self, *given):
+            self.given, self.job, self.told = given, None, []
+            made.append(self)
+
+        def open(self, spec):
+            self.told.append(spec)
+
+        def begin(self, job):
+            self.job = job
+            self.told.append(job)
+
+    monkeypatch.setattr(local, "_WorkerProcess", Process)
+    busy, idle = a_worker(Job(0, 8)), a_worker(None)
+    begun = []
+    idle.begin = lambda job: (begun.append(job), setattr(idle, "job", job))
+    engine = an_engine(busy, idle, processes=4)
+    engine._target, engine._spec, engine._inbox = "m:f", b"spec", "inbox"
+    jobs = iter([Job(1, k) for k in range(5)])
+    assert engine._feed(engine_jobs.JobQueue(jobs)) is True
+    assert begun == [Job(1, 0)]
+    assert [each.told for each in made] == [[b"spec", Job(1, 1)], [b"spec", Job(1, 2)]]
+    assert [each.given for each in made] == [("m:f", 10.0, engine._clock, "inbox")] * 2
+    assert engine._workers == [busy, idle, *made]
+    assert next(jobs) == Job(1, 3), "none is taken that cannot begin"
+    made[1].job = None
+    assert engine._feed(engine_jobs.JobQueue(iter(()))) is True
+    for worker in engine._workers:
+        worker.job = None
+    assert engine._feed(engine_jobs.JobQueue(iter(()))) is False
+    engine._closed = True
+    with pytest.raises(CampaignError, match=r"^the workers were stopped while jobs were running$"):
+        engine._feed(engine_jobs.JobQueue(iter([Job(1, 4)])))
+    assert len(made) == 2
+
+
+@pytest.mark.parametrize("error", [None, OSError, TimeoutError, ValueError, AttributeError, TypeError, KeyError])
+def test_a_late_worker_is_killed_by_its_nanny_or_sent_away_by_the_scheduler(error):
+    engine, asked = a_cluster(), []
+
+    def call(what, *args, **options):
+        asked.append((what, args, options))
+        if error is not None and what == "run":
+            raise error("no nanny")
+        if error is OSError:
+            raise TimeoutError  # the scheduler does not answer either
+
+    engine._call = call
+    engine._client._run, engine._client.scheduler.retire_workers = "run", "retire"
+    engine._kill("tcp://late")
+    by_nanny = ("run", (cluster.kill,), {"workers": ["tcp://late"], "nanny": True})
+    sent_away = ("retire", (), {"workers": ["tcp://late"], "close_workers": True, "remove": True})
+    assert asked == [by_nanny] + [sent_away] * (error is not None)
+
+
+def test_what_ended_within_a_slice_is_heard_before_what_is_late():
+    """The end of a job that is no longer under way means nothing."""
+    engine, ended, waited = a_cluster(_flights={5: Flight(Job(0, 5))}), [9, 5], []
+
+    def get(timeout):
+        waited.append(timeout)
+        if not ended:
+            raise Empty
+        return ended.pop(0)
+
+    engine._ended = SimpleNamespace(get=get)
+    engine._task_ended = lambda serial, jobs: iter([(serial, jobs)])
+    engine._stop_the_late = lambda: iter(["late"])
+    assert [list(engine._wait("jobs")) for _ in range(3)] == [["late"], [(5, "jobs"), "late"], ["late"]]
+    assert waited == [engine_jobs.SLICE_S] * 3

@@ -1879,3 +1879,20 @@ def test_rows_are_drawn_with_what_all_have_and_each_keeps_its_mission_mirror_and
     assert found.files == [f"mission 3 {values[0]}", "no mission of cell 3", f"mission 3 {values[2]}"]
     assert found.mirrors == ["mirror 3 8.0", "mirror 3 16.0", "mirror 3 32.0"]
     assert found.keys == [(3, *each.items()) for each in values]
+
+
+def test_traces_of_one_row_of_two_cells_have_each_the_value_of_their_own():
+    """They come in any order, and a value may be 0."""
+    made, put = a_runner(), []
+    made._worst = lambda cell: [(3, 1.0), (5, 0.0)] if cell == 0 else [(5, 4.0), (3, -2.0)]
+    made.book = SimpleNamespace(traces=lambda: (), drop_trace=None, put_trace=put.append)
+
+    def outcomes(jobs):
+        for job in reversed(jobs):
+            found = records.WorstTrace(job.cell, job.row, "", np.nan, np.zeros(1), np.zeros((1, 1)), np.zeros((1, 1)))
+            yield Outcome(job, "done", chunk_format.pack_trace(found))
+
+    made._outcomes = outcomes
+    made._traces()
+    told = [(each.cell, each.row, each.output, each.value) for each in put]
+    assert told == [(1, 3, "margin", -2.0), (1, 5, "margin", 4.0), (0, 5, "margin", 0.0), (0, 3, "margin", 1.0)]
