@@ -1267,3 +1267,52 @@ def test_what_a_ledger_was_begun_with_is_told_in_the_order_of_names(changes, wor
         "bring back what it was begun with, or begin the campaign anew in another file",
     ]
     check_same(kept, dict(reversed(kept.items())), Path("b.ledger"))
+
+
+def test_what_is_whole_keeps_its_mark_when_a_ledger_is_mended(path):
+    """Whoever reads on behind a mark then misses and doubles nothing; what was damaged comes in behind all others."""
+    came = [(1, 3), (0, 5), (1, 0), (0, 2)]
+    with Ledger.create(path, HEAD, {"rounds": 3, "file": "a.toml"}) as ledger:
+        for cell, number in came:
+            ledger.put(cell, number, packed(number, cell))
+        ledger.put_trace(TRACE)
+        before = [mark for mark, _ in ledger.added(0)]
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute("UPDATE chunks SET sha256 = x'00' WHERE cell = 0 AND number = 5")
+        connection.execute("UPDATE notes SET value = '4' WHERE key = 'rounds'")
+        connection.execute("UPDATE head SET payload = x'00'")
+    assert verify(path).damaged == ((0, 5),)
+    mend(path)
+    assert verify(path, came) == mending.Verified(3, (), ((0, 5),), ())
+    with Ledger.open(path, write=True) as ledger:
+        assert ledger.head == HEAD
+        assert [(mark, each.cell, each.number) for mark, each in ledger.added(0)] == [
+            (before[0], 1, 3), (before[2], 1, 0), (before[3], 0, 2)
+        ]  # fmt: skip
+        assert {key: value for key, value in ledger.notes().items() if key != "writer"} == {"file": "a.toml"}
+        assert [(each.cell, each.row) for each in ledger.traces()] == [(TRACE.cell, TRACE.row)]
+        ledger.put(0, 5, packed(5, 0))
+        ((mark, again),) = ledger.added(before[3])
+        assert mark > before[3] and (again.cell, again.number) == (0, 5)
+
+
+@pytest.mark.parametrize("change", ["DELETE FROM notes", "UPDATE notes SET value = '{}' WHERE key = 'writer'"])
+def test_a_writer_that_is_not_noted_is_another_process(path, monkeypatch, change):
+    monkeypatch.setattr(file, "_GLANCE_S", 0.01)
+    Ledger.create(path, HEAD).close()
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(change)
+    with closing(file.locked(path)):
+        assert is_written(path)
+        assert said(Ledger.open, path, write=True).startswith(f"another process already writes to {path}: wait for it")
+    assert not is_written(path)
+    Ledger.open(path, write=True).close()
+
+
+def test_a_writer_whose_note_has_no_time_is_another_process(path, monkeypatch):
+    monkeypatch.setattr(file, "_GLANCE_S", 0.01)
+    with Ledger.create(path, HEAD) as ledger:
+        ledger.note("writer", {"pid": 7, "host": "here"})
+        assert said(Ledger.open, path, write=True).startswith("another process already writes to ")
+        ledger.note("writer", {"pid": 7, "host": "here", "since": "noon"})
+        assert said(Ledger.open, path, write=True).startswith("process 7 on here, since noon, already writes to ")
