@@ -1,6 +1,7 @@
 """The ledger against kills, full and read-only disks, flipped bits and a second writer; and chunks as bytes."""
 
 import contextlib
+import glob
 import hashlib
 import json
 import math
@@ -17,6 +18,7 @@ import textwrap
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -1316,3 +1318,39 @@ def test_a_writer_whose_note_has_no_time_is_another_process(path, monkeypatch):
         assert said(Ledger.open, path, write=True).startswith("another process already writes to ")
         ledger.note("writer", {"pid": 7, "host": "here", "since": "noon"})
         assert said(Ledger.open, path, write=True).startswith("process 7 on here, since noon, already writes to ")
+
+
+@pytest.mark.parametrize("fails", [True, False])
+def test_rows_are_read_from_both_ends_where_sqlite_fails_and_once_where_it_does_not(fails):
+    """A row with a wrong checksum is left out from either side; nothing is raised."""
+
+    def row(mark, sound=True):
+        return mark, f"k{mark}", str(mark), file.digest(f"k{mark}", str(mark) if sound else "other")
+
+    asked = []
+
+    def execute(sql):
+        asked.append(sql)
+        yield from (row(1), row(2, sound=False), row(4)) if sql.endswith(" ASC") else (row(9), row(7, False), row(6))
+        if fails:
+            raise sqlite3.DatabaseError("malformed")
+
+    found = [each[0] for each in mending._whole_rows(SimpleNamespace(execute=execute), "notes")]
+    assert found == ([1, 4, 9, 6] if fails else [1, 4])
+    orders = ("ASC", "DESC")[: 1 + fails]
+    assert asked == [f"SELECT rowid, key, value, sha256 FROM notes ORDER BY rowid {order}" for order in orders]
+
+
+def test_what_a_ledger_that_was_removed_has_left_beside_it_is_not_taken_into_a_new_one(path, tmp_path):
+    """The log of a writer that was killed has a chunk in it that would be read."""
+    other = tmp_path / "other.ledger"
+    with Ledger.create(other, HEAD) as ledger:
+        ledger.put(0, 7, packed(7))
+        log = other.with_name("other.ledger-wal").read_bytes()
+    assert log
+    for ending, left in (("-wal", log), ("-shm", b"left"), ("-journal", b"left")):
+        path.with_name(path.name + ending).write_bytes(left)
+    with Ledger.create(path, HEAD) as ledger:
+        assert (ledger.done(), ledger.count()) == (set(), 0)
+    assert {each.name for each in tmp_path.glob(f"{glob.escape(path.name)}*")} == {path.name, f"{path.name}.lock"}
+    assert verify(path).sound

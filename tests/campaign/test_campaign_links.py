@@ -710,3 +710,42 @@ def test_a_list_that_is_drawn_as_one_number_has_the_proportions_of_its_own_cell(
     drawn = {f"{key}.1": 3.0, f"{key}.2": 5.0}
     assert made.mission(1, drawn).mission.scenario.pid_frequencies_hz == (3.0, 5.0, 8.0)
     assert made.mission(0, drawn).mission.scenario.pid_frequencies_hz == (3.0, 5.0)
+
+
+def test_the_order_of_its_files_does_not_tell_a_campaign_apart_and_what_name_has_which_bytes_does(tmp_path):
+    names = ("c.toml", "a.toml", "b.toml")
+    for name in names:
+        (tmp_path / name).write_text(f"of {name}", encoding="utf-8")
+    files = [tmp_path / name for name in names]
+
+    def told(*order):
+        return bundle.mission_sha256(SimpleNamespace(path=files[0], files=tuple(files[k] for k in order)))
+
+    first = told(0, 1, 2)
+    assert first == told(2, 0, 1) == told(1, 2, 0) != told(0, 1)
+    files[1].write_text("of b.toml", encoding="utf-8")
+    files[2].write_text("of a.toml", encoding="utf-8")
+    assert told(0, 1, 2) != first
+
+
+def test_a_bundle_that_cannot_be_read_leaves_no_folder_and_one_that_can_until_it_goes(tmp_path, monkeypatch):
+    mission(tmp_path, "gallery")
+    made = iter(tmp_path / f"opened {number}" for number in range(3))
+
+    def scratch(name):
+        folder = next(made)
+        folder.mkdir()
+        return folder
+
+    monkeypatch.setattr(bundle, "scratch_folder", scratch)
+    spec = json.loads(bundle.packed(replace(loaded(tmp_path, "gallery", DRAWN), chunk_rows=2), ()))
+    found = bundle.opened(json.dumps(spec).encode())
+    assert {each.name for each in (tmp_path / "opened 0").iterdir()} == spec["files"].keys()
+    assert (found.campaign.chunk_rows, found.campaign.path) == (2, tmp_path / "opened 0" / spec["campaign"])
+    del found
+    assert not (tmp_path / "opened 0").exists()
+    (other,) = spec["files"].keys() - {spec["campaign"]}
+    for files in ({name: data for name, data in spec["files"].items() if name != other}, {"../x": "", **spec["files"]}):
+        with pytest.raises((MissionError, CampaignError)):
+            bundle.opened(json.dumps(spec | {"files": files}).encode())
+    assert not list(tmp_path.glob("opened*"))
