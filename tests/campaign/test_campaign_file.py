@@ -1918,3 +1918,28 @@ def test_a_file_that_is_drawn_by_an_absolute_path_does_not_go_to_a_worker(tmp_pa
     names = ["campaign.toml", "mission.toml", "a.csv", "b.csv"]
     assert [file.name for file in found.campaign.files] == names
     assert all(file.is_file() and file.parent != tmp_path for file in found.campaign.files)
+
+
+def test_a_campaign_depends_on_each_file_of_its_mission_its_cells_and_its_draws_once(tmp_path):
+    """The mission's own mirror, those of a grid, and what a mission of any cell or a draw names, in that order."""
+    grid = '[grid]\nmirror = ["plain.toml", "mirror.toml", "third.toml"]\n'
+    drawn = '[inputs."fine_pointing.vibration.file"]\ndistribution = "table"\nvalues = ["b.csv", "a.csv", "c.csv"]\n'
+    changes = (('\nspectrum = "olympus"', '\nspectrum = "table"\nfile = "a.csv"'),)
+    path = written(tmp_path, HEAD + LOOP + drawn + grid, changes=changes)
+    whole = (tmp_path / "mission.toml").read_text(encoding="utf-8")
+    kept = "".join(f"\n[{each}" for each in whole.split("\n[")[1:] if not each.startswith("mirror"))
+    own = f'{whole.split("[")[0]}[mirror]\nfile = "mirror.toml"\n{kept}'
+    (tmp_path / "mission.toml").write_text(own, encoding="utf-8")
+    (tmp_path / "third.toml").write_text((tmp_path / "plain.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    for name in "abc":
+        (tmp_path / f"{name}.csv").write_text("Hz, urad^2/Hz\n1, 1\n2, 1\n", encoding="utf-8")
+    names = ["campaign.toml", "mission.toml", "mirror.toml", "plain.toml", "third.toml", "a.csv", "b.csv", "c.csv"]
+    assert [each.relative_to(tmp_path).as_posix() for each in read_definition(path)[0].files] == names
+    (tmp_path / "c.csv").unlink()
+    (tmp_path / "a.csv").unlink()
+    with pytest.raises(MissionError) as caught:
+        read_definition(path)
+    assert [(fault.key, Path(fault.value.strip('"')).name) for fault in caught.value.faults] == [
+        ("mission", "a.csv"),
+        ("mission", "c.csv"),
+    ]
