@@ -1354,3 +1354,22 @@ def test_what_a_ledger_that_was_removed_has_left_beside_it_is_not_taken_into_a_n
         assert (ledger.done(), ledger.count()) == (set(), 0)
     assert {each.name for each in tmp_path.glob(f"{glob.escape(path.name)}*")} == {path.name, f"{path.name}.lock"}
     assert verify(path).sound
+
+
+@pytest.mark.parametrize("fails", ["connected", "note"])
+def test_a_ledger_that_cannot_be_opened_to_write_is_left_to_the_next_writer(path, monkeypatch, fails):
+    """At once, while the error is still being looked at."""
+    Ledger.create(path, HEAD).close()
+
+    def refused(*given, **how):
+        raise CampaignError(f"no {fails}")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(*((file, "connected") if fails == "connected" else (Ledger, "note")), refused)
+        with pytest.raises(CampaignError, match=f"^no {fails}$") as caught:
+            Ledger.open(path, write=True)
+    assert not is_written(path) and caught.value is not None
+    with Ledger.open(path, write=True) as ledger:
+        assert is_written(path)
+        ledger.note("state", "running")
+    assert not is_written(path)
