@@ -1943,3 +1943,24 @@ def test_a_campaign_depends_on_each_file_of_its_mission_its_cells_and_its_draws_
         ("mission", "a.csv"),
         ("mission", "c.csv"),
     ]
+
+
+def test_lists_and_switches_are_drawn_by_their_places_with_their_weights(tmp_path):
+    rms = '[["1 urad", "2 urad"], ["3 urad", "4 urad"], ["2 urad", "1 urad"]]'
+    lists = distributed("jitter.rms", f"{TABLE}values = {rms}\nweights = [1, 2.5, 1.5]")
+    switch = distributed("point_ahead.corrected", f"{TABLE}values = [false, true]\nweights = [3, 1]")
+    changes = (("[requirement]", JITTER + "[requirement]"),)
+    found = loaded(tmp_path, HEAD + lists + switch, changes=changes)
+    first, second = (draw.distribution for draw in found.draws)
+    assert (first.values, first.is_words) == ((1.0, 2.0, 3.0), True)
+    assert first.probabilities == pytest.approx((0.2, 0.5, 0.3))
+    assert (second.values, second.is_words) == ((1.0, 2.0), True)
+    assert second.probabilities == (0.75, 0.25)
+    builder = MissionBuilder(found)
+    for place, switched, own, corrected in ((2.0, 1.0, (3e-6, 4e-6), False), (3.0, 2.0, (2e-6, 1e-6), True)):
+        m = builder.mission(0, {"jitter.rms": place, "point_ahead.corrected": switched}).mission
+        assert m.jitter.rms_rad == pytest.approx(own)
+        assert m.point_ahead.corrected is corrected
+    twice = rms.replace('["2 urad", "1 urad"]', '["1000 nrad", "2 urad"]')
+    (fault,) = faults(tmp_path, HEAD + distributed("jitter.rms", f"{TABLE}values = {twice}"), changes=changes)
+    assert (fault.key, fault.reason) == ("inputs.jitter.rms.values", "has a value twice")
