@@ -717,3 +717,120 @@ def test_runs_answer_for_words_and_for_a_code_where_the_mission_asks_for_them(mo
 def test_a_spacing_without_windows_is_refused(refused):
     words = refused("worst-case", DEFAULT, "--mirror", IDENTIFIED, "--spacing", "1 min")
     assert "--spacing is between windows: give --window, their length, too." in words
+
+
+# ------------------------------------------------------------------------- what cannot be computed names its mission
+def cannot(*given, **more):
+    raise ValueError("it cannot be")
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        ((), "microrad.cli.pointing.indices_of_mission"),
+        ((), "microrad.cli.pointing.stated_beside"),
+        ((), "microrad.loop.coupled_study.of_mission"),
+        ((), "microrad.loop.controller_study.design"),
+        ((), "microrad.loop.pointing_loop.linear.close"),
+        ((), "microrad.loop.pointing_loop.windows.windowed_errors"),
+        ((), "microrad.link.error_budget.assembly.judge"),
+        (("--simulate", "2"), "microrad.loop.pointing_loop.simulated_windows.windows_asked"),
+        (("--simulate", "2"), "microrad.loop.pointing_loop.simulated_windows.ask"),
+    ],
+)
+def test_each_step_of_the_errors_that_cannot_be_is_refused_with_the_mission(refused, monkeypatch, options, part):
+    class Scene(controller_study.Scene):
+        loop, table, theory = "loop", "table", "theory"
+
+    made, scene = SimpleNamespace(controller="made"), object.__new__(Scene)
+    answers = {
+        "microrad.cli.pointing.indices_of_mission": ["index"],
+        "microrad.cli.pointing.stated_beside": SimpleNamespace(with_loop=True),
+        "microrad.cli.pointing._fitting": (["index"], []),
+        "microrad.loop.coupled_study.of_mission": scene,
+        "microrad.loop.controller_study.design": (made,),
+        "microrad.loop.controller_study.results.span": "span",
+        "microrad.loop.pointing_loop.linear.close": "closed",
+        "microrad.loop.pointing_loop.windows.windowed_errors": "errors",
+        "microrad.loop.pointing_loop.simulated_windows.windows_asked": "windows",
+        "microrad.loop.pointing_loop.simulated_windows.ask": ["answer"],
+        "microrad.link.error_budget.assembly.judge": SimpleNamespace(judged=()),
+        "microrad.report.fine_pointing.words.arrival": "",
+        "microrad.report.fine_pointing.data.arrival": {},
+        "microrad.report.fine_pointing.windows.windows_data": {},
+        "microrad.report.fine_pointing.windows.windows_text": "",
+    }
+    for name, answer in answers.items():
+        monkeypatch.setattr(name, cannot if name == part else lambda *given, answer=answer, **more: answer)
+    assert refused("pointing", DEFAULT, *options) == f"microrad: {DEFAULT}: it cannot be\n"
+
+
+@pytest.mark.parametrize(
+    ("axes", "command", "part"),
+    [
+        (1, "design", "microrad.loop.controller_study.scene"),
+        (1, "design", "microrad.loop.controller_study.offered"),
+        (1, "design", "microrad.loop.controller_study.design_and_promise"),
+        (2, "design", "microrad.loop.coupled_study.scene"),
+        (2, "design", "microrad.loop.coupled_study.design_and_promise"),
+        (1, "worst-case", "microrad.loop.worst_case.of_table"),
+        (1, "worst-case", "microrad.loop.controller_study.design"),
+        (1, "worst-case", "microrad.loop.worst_case.worst_case"),
+        (2, "worst-case", "microrad.loop.worst_case.of_several_axes"),
+        (2, "worst-case", "microrad.loop.coupled_study.design"),
+    ],
+)
+def test_a_design_or_a_search_that_cannot_be_is_refused_with_the_mission(
+    refused, folder, monkeypatch, axes, command, part
+):
+    (folder / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+    mirror = ("--mirror", "two-axes.toml") if axes == 2 else ()
+    monkeypatch.setattr("microrad.loop.worst_case.of_table", lambda *given: "known")
+    monkeypatch.setattr("microrad.loop.worst_case.of_several_axes", lambda *given: "known")
+    monkeypatch.setattr("microrad.loop.worst_case.of_scene", lambda *given: "subject")
+    for room in (controller_study, coupled_study):
+        monkeypatch.setattr(room, "scene", lambda *given: SimpleNamespace(table=SimpleNamespace(seed=7)))
+    monkeypatch.setattr(controller_study, "offered", lambda *given: ("PI",))
+    monkeypatch.setattr(controller_study, "design", lambda *given: ("made",))
+    monkeypatch.setattr(part, cannot)
+    said = refused(command, DEFAULT, *mirror)
+    assert said == f"microrad: {DEFAULT}: it cannot be\n"
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_warnings_of_several_axes_are_broken_promises_then_what_is_left_out_then_what_is_refused(
+    call, folder, monkeypatch, as_json
+):
+    (folder / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
+    made = [SimpleNamespace(name=name) for name in ("PI", "LQG", "H2")]
+    left = [SimpleNamespace(worst=each, holds=each.holds, times=9.0) for each in (BROKEN, HELD, Outlook(1e-6, 2e-6))]
+    found = SimpleNamespace(made=made, refused={"Youla": "no Youla here", "Glover": "no Glover here"})
+    told = []
+    monkeypatch.setattr(coupled_study, "scene", lambda *given: "scene")
+    monkeypatch.setattr(coupled_study, "design_and_promise", lambda scene, progress: (found, left))
+    monkeypatch.setattr("microrad.report.fine_pointing.words.left_out", lambda scene: ["no drift", "no creep"])
+    monkeypatch.setattr(coupled_design, "_data", lambda design, left, mark: {"name": design.name, "mark": mark})
+    monkeypatch.setattr(coupled_design, "_text", lambda *given: told.append(given) or "in words")
+    result = call("design", DEFAULT, "--mirror", "two-axes.toml", *["--json"] * as_json)
+    if as_json:
+        data = json.loads(result.out)
+        assert [*data] == ["mission_sha256", "mirror", "controllers", "warnings"]
+        assert (data["mission_sha256"], data["mirror"]) == (
+            load_mission(DEFAULT).sha256,
+            several_axes.two_axes().mirror.name,
+        )
+        assert [tuple(each.values()) for each in data["controllers"]] == [
+            ("PI", "refused"),
+            ("LQG", ""),
+            ("H2", "refused"),
+        ]
+        broken, *others = data["warnings"]
+    else:
+        ((scene, designs, figures, marks, (broken, *others)),) = told
+        assert (scene, designs, figures, marks) == ("scene", found, left, ["refused", "", "refused"])
+        assert result.out == "in words\n"
+    assert (
+        result.code == 1
+        and " is left, simulated on the mission's mirror, by PI (1.75 times), H2 (2.00 times): " in broken
+    )
+    assert others == ["no drift", "no creep", "no Youla here", "no Glover here"]
