@@ -396,3 +396,61 @@ def test_links_that_cannot_be_computed_are_refused_with_their_file(refused, fold
     monkeypatch.setattr("microrad.link.study.run_link_study", none)
     path = path_of(folder, {"constellation": BY_FILE})
     assert f"{path}: no light arrives" in " ".join(refused(command, path).split())
+
+
+def cannot(*given, **more):
+    raise ValueError("it cannot be")
+
+
+@pytest.mark.parametrize(
+    ("command", "form", "part"),
+    [
+        ("contacts", "--csv", "microrad.orbit.day.run_day_study"),
+        ("contacts", "--json", "microrad.orbit.day.run_day_study"),
+        ("constellation", "--json", "microrad.orbit.day.given_loss"),
+        ("constellation", "--json", "microrad.orbit.constellation.run_constellation"),
+        ("constellation", "--csv", "microrad.orbit.operations.csv_text"),
+        ("constellation", "--contact-plan", "plan"),
+    ],
+)
+def test_a_day_and_a_plan_that_cannot_be_computed_are_refused_with_their_file(
+    refused, folder, monkeypatch, command, form, part
+):
+    plan = SimpleNamespace(
+        volume_bit=1.0, planned="planned", epoch=SimpleNamespace(utc="2026"), contact_plan=cannot
+    )
+    monkeypatch.setattr(day_study, "given_loss", lambda links: 3.0)
+    monkeypatch.setattr(plans, "run_constellation", lambda file, loss, progress: plan)
+    if part != "plan":
+        monkeypatch.setattr(part, cannot)
+    path = path_of(folder)
+    assert refused(command, path, form) == f"microrad: {path}: it cannot be\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "flags", "named"),
+    [
+        ("contacts", ("--html", "--json"), "--csv, --html and --json"),
+        ("contacts", ("--csv", "--json"), "--csv, --html and --json"),
+        ("constellation", ("--csv", "--json"), "--csv, --contact-plan and --json"),
+        ("constellation", ("--contact-plan", "--json"), "--csv, --contact-plan and --json"),
+    ],
+)
+def test_forms_that_exclude_each_other_are_named_before_any_file_is_read(refused, folder, command, flags, named):
+    said = refused(command, "nowhere.toml", *flags)
+    assert said == f"microrad: {named} exclude each other; give one of them.\n"
+
+
+def test_a_plan_is_of_the_loss_of_the_links_and_has_the_name_of_its_mission(call, folder, monkeypatch):
+    asked = []
+    plan = SimpleNamespace(volume_bit=1.0)
+    monkeypatch.setattr(day_study, "given_loss", lambda links: asked.append(links) or 2.75)
+    monkeypatch.setattr(
+        plans, "run_constellation", lambda file, loss, progress: asked.append((file, loss, callable(progress))) or plan
+    )
+    monkeypatch.setattr("microrad.report.day.constellation.plan_data", lambda found: {"same": found is plan})
+    path = path_of(folder)
+    data = json.loads(call("constellation", path, "--json").out)
+    links, (file, loss, told) = asked
+    assert data == {"mission": file.mission.name, "same": True}
+    assert (file, loss, told) == (links.file, 2.75, True)
