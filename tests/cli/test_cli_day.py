@@ -416,9 +416,7 @@ def cannot(*given, **more):
 def test_a_day_and_a_plan_that_cannot_be_computed_are_refused_with_their_file(
     refused, folder, monkeypatch, command, form, part
 ):
-    plan = SimpleNamespace(
-        volume_bit=1.0, planned="planned", epoch=SimpleNamespace(utc="2026"), contact_plan=cannot
-    )
+    plan = SimpleNamespace(volume_bit=1.0, planned="planned", epoch=SimpleNamespace(utc="2026"), contact_plan=cannot)
     monkeypatch.setattr(day_study, "given_loss", lambda links: 3.0)
     monkeypatch.setattr(plans, "run_constellation", lambda file, loss, progress: plan)
     if part != "plan":

@@ -1478,3 +1478,88 @@ def test_a_ratio_beyond_the_most_is_not_told_as_the_most(times, told):
         ExportError, match=f": {told} times the 1 µrad rms an axis of linear theory, where 1.5 times is"
     ):
         choice.promised(chosen)
+
+
+# ------------------------------------------------------------------------------------------ parts of a loop, unlike all
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (ExportError("controller 'PI': A is nan"), "controller 'PI': A is nan"),
+        (ValueError("the loop is unstable"), "m.toml: the loop is unstable"),
+    ],
+)
+def test_a_controller_that_cannot_fly_is_refused_once_with_its_mission_or_its_name(monkeypatch, raised, said):
+    def broken(of):
+        raise raised
+
+    monkeypatch.setattr(choice, "_whole_controller", lambda chosen: "whole")
+    monkeypatch.setattr(choice, "trimmed", lambda of: of)
+    monkeypatch.setattr(choice, "minimal", broken)
+    with pytest.raises(ExportError) as told:
+        choice.flight_controller(SimpleNamespace(source=SimpleNamespace(path="m.toml")))
+    assert str(told.value) == said
+
+
+@pytest.mark.parametrize("gauge", [None, SimpleNamespace(resolution_rad=7e-9, noise_rad=1.0)])
+def test_a_loop_unit_has_the_steps_and_resolutions_of_its_own_sensors(monkeypatch, gauge):
+    optical = SimpleNamespace(delay_steps=5, every=3, field_of_view_rad=4e-3, resolution_rad=2e-8)
+    timing = SimpleNamespace(steps_per_sample=11, delay_steps=2)
+    loop = SimpleNamespace(mirror="mirror", optics="optics", drive="drive", timing=timing, optical=optical, gauge=gauge)
+    chosen = SimpleNamespace(source="source", scene=SimpleNamespace(loop=loop))
+    monkeypatch.setattr(choice, "flight_controller", lambda of: ("controller of", of))
+    monkeypatch.setattr(choice, "_plant_unit", lambda *of: of)
+    unit = choice.loop_unit(chosen)
+    assert unit.plant == ("source", "mirror", "optics", "drive", timing)
+    assert unit.controller == ("controller of", chosen)
+    assert (unit.steps_per_sample, unit.delay_steps) == (11, 2)
+    assert (unit.optical_delay_steps, unit.optical_every, unit.field_of_view_rad) == (5, 3, 4e-3)
+    assert (unit.optical_resolution_rad, unit.gauge_resolution_rad) == (2e-8, 7e-9 if gauge else 0.0)
+
+
+def test_a_loop_unit_of_the_paper_reads_its_sensor_at_each_sample_and_has_no_gauge(monkeypatch):
+    timing = SimpleNamespace(steps_per_sample=13, delay_steps=4)
+    setup = SimpleNamespace(drive=SimpleNamespace(sensor_resolution_rad=3e-8), timing=timing)
+    chosen = choice.PaperLoopChoice("source", "scenario", "PID", SimpleNamespace(axes=2), setup, "inverse")
+    monkeypatch.setattr(choice, "flight_controller", lambda of: "controller")
+    monkeypatch.setattr(choice, "_plant_unit", lambda *of: of)
+    unit = choice.loop_unit(chosen)
+    source, mirror_, optics, drive, time = unit.plant
+    assert (source, mirror_, drive, time) == ("source", chosen.mirror, setup.drive, timing)
+    assert optics.tolist() == [[1.0, 0.0], [0.0, 1.0]]
+    assert (unit.steps_per_sample, unit.delay_steps, unit.optical_delay_steps, unit.optical_every) == (13, 4, 0, 1)
+    assert (unit.field_of_view_rad, unit.optical_resolution_rad, unit.gauge_resolution_rad) == (inf, 3e-8, 0.0)
+
+
+def test_recorded_vectors_are_of_the_missions_seed_and_keep_the_readings_that_are_looked_at(monkeypatch):
+    asked, counts = [], np.arange(100.0, 120.0)
+    inputs, commands = np.arange(12.0).reshape(2, 6), np.array([[1.0], [2.0]])
+
+    def replayed(*given):
+        asked.append(given)
+        return SimpleNamespace(inputs=inputs, commands=commands, counts=counts)
+
+    monkeypatch.setattr(choice, "replay", replayed)
+    monkeypatch.setattr(choice, "_whole_controller", lambda chosen: "whole")
+    monkeypatch.setattr(choice, "_looked_at", lambda of: {"error": slice(0, 1), "reference": slice(3, 5)})
+    scene = SimpleNamespace(loop="loop", table=SimpleNamespace(seed=41))
+    found = choice.vectors(SimpleNamespace(scene=scene, controller="controller"), 2)
+    assert asked == [("loop", "controller", 2, 41)]
+    assert found.inputs.tolist() == [[0.0, 3.0, 4.0], [6.0, 9.0, 10.0]] and found.commands is commands
+    assert found.saturated == int(counts[kernels.COUNT_SATURATED])
+    assert found.rate_clamped == int(counts[kernels.COUNT_INVERSE_CLAMPED])
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "said"),
+    [
+        (1234.5, "Hz", "1.23 kHz"),
+        (0.0004567, "s", "457 µs"),
+        (inf, "dB", "inf dB"),
+        (12.345, "deg", "12.3 deg"),
+        (0.56789, "", "0.568"),
+    ],
+)
+def test_margins_of_a_report_have_three_digits_in_their_own_unit(value, unit, said):
+    of = made_export(controller=made_controller(margins=(("first", 2.0, ""), ("last", value, unit))))
+    (line,) = (each for each in flight_write.report_text(of).splitlines() if each.startswith("  margins "))
+    assert line == f"  margins       first 2, last {said}"

@@ -32,6 +32,8 @@ from microrad.export.matrices.models import (
     MIRROR,
     MIRROR_AT_REST,
     SAMPLED_PLANT,
+    _controller,
+    _coupled_models,
     _pointing_models,
     axis_plant,
 )
@@ -1076,3 +1078,114 @@ def test_a_coefficient_that_no_float_holds_is_refused():
     assert matrix_forms.floats([Fraction(1, 3), Fraction(10**308)]).tolist() == [1 / 3, 1e308]
     with pytest.raises(ExportError, match="beyond the range of a float; take a slower unit of time, or fewer states"):
         matrix_forms.floats([Fraction(1), Fraction(10**309)])
+
+
+# ----------------------------------------------------------------------------------------------- several models at once
+def test_a_number_that_json_has_not_is_told_with_the_names_of_all_models():
+    given = [two_by_two(name=name) for name in ("one", "two", "three")]
+    system = replace(given[1].system, D=np.array([[0.0, np.inf], [0.0, 0.0]]))
+    given[1] = replace(given[1], system=system)
+    with pytest.raises(ExportError) as told:
+        matrices.json_text(given)
+    said = str(told.value)
+    assert said.startswith("one of the models one, two, three holds a number that is not finite (")
+    assert said.endswith("); JSON has none, write a .mat file")
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (
+            ("a", "end", "b"),
+            "'end' is no name of a variable in MATLAB: a letter, then at most 30 letters, digits or _, and no ",
+        ),
+        (("a", "b", "2c"), "'2c' is no name of a variable in MATLAB: "),
+        (("a", "b", "c", "b"), "two models are called 'b'; rename one of them"),
+    ],
+)
+def test_a_wrong_name_behind_right_ones_is_the_one_that_is_told(names, said, tmp_path):
+    with pytest.raises(ExportError) as told:
+        matrices.write_mat([two_by_two(name=name) for name in names], tmp_path / "m.mat")
+    assert str(told.value).startswith(said) and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("period_s", [0.0, 0.01])
+def test_an_object_of_python_control_has_the_names_of_two_inputs_two_outputs_and_three_states(period_s):
+    theirs = matrices.to_control(two_by_two(period_s))
+    assert (theirs.name, theirs.dt, theirs.input_labels, theirs.output_labels) == (
+        "two",
+        period_s,
+        ["a", "b"],
+        ["x", "y"],
+    )
+    assert theirs.state_labels == ["s0", "s1", "s2"]
+    unread = two_by_two(
+        system=lti.StateSpace(np.diag([-1.0, -2.0, -3.0]), np.zeros((3, 2)), np.zeros((2, 3)), np.eye(2))
+    )
+    assert matrices.to_control(unread).nstates == 3
+
+
+@pytest.mark.parametrize("every", [1, 2, 5])
+def test_a_plant_of_several_axes_says_how_rarely_its_sensor_delivers(plate, every):
+    loop = replace(plate.scene.loop, optical=replace(plate.scene.loop.optical, every=every))
+    scene = SimpleNamespace(rest=plate.scene.rest, loop=loop)
+    plant, _ = _coupled_models(SimpleNamespace(scene=scene, source=plate.source), plate.controller.system)
+    slow = f"; a sensor that delivers every {every} samples counts as one of more delay" if every > 1 else ""
+    assert plant.meaning.endswith(f"the optical error as its sensor delivers it{slow}")
+
+
+def test_models_that_cannot_be_made_are_refused_with_the_mission(file, monkeypatch):
+    def broken(*given):
+        raise ValueError("no such mirror")
+
+    monkeypatch.setattr(mirror, "from_mission", broken)
+    with pytest.raises(ExportError) as told:
+        matrices.models(choice.source(file))
+    assert str(told.value) == f"{file.path}: no such mirror"
+
+
+@pytest.mark.parametrize(
+    ("adaptation", "by_difference", "kinds", "words"),
+    [
+        (None, None, ("command_v",), "PI, as it flies; its"),
+        (None, True, ("command_v", "target_rad"), "takes its targets behind it; its"),
+        (None, False, ("command_v", "target_rad", "target_rate_rad_s"), "takes its targets behind it; its"),
+        (
+            "learns",
+            False,
+            ("command_v", "target_rad", "target_rate_rad_s", "unexpected_error_rad"),
+            "expected ones; its",
+        ),
+    ],
+)
+def test_a_controller_says_its_limits_and_has_an_output_of_each_kind_for_each_actuator(
+    file, adaptation, by_difference, kinds, words
+):
+    inverse = None if by_difference is None else SimpleNamespace(by_difference=by_difference)
+    inputs = (
+        SimpleNamespace(name="tip_rad_s", size=2, unit="rad/s"),
+        SimpleNamespace(name="gauge_rad", size=1, unit="rad"),
+    )
+    system = lti.StateSpace(
+        np.eye(2) / 2.0, np.ones((2, 3)), np.ones((3 * len(kinds), 2)), np.zeros((3 * len(kinds), 3))
+    )
+    of = SimpleNamespace(
+        **{"name": "PI", "inverse": inverse, "adaptation": adaptation, "inputs": inputs, "actuators": 3},
+        **{"minimum_v": -4.5, "maximum_v": 7.25, "period_s": 4e-4, "system": system, "anti_windup": "windup"},
+    )
+    made = _controller(choice.source(file), of)
+    assert made.meaning.endswith(f"{words} commands are clipped to -4.5 .. 7.25 V")
+    assert [(p.name, p.unit) for p in made.inputs] == [
+        ("tip_rad_s_0", "rad/s"),
+        ("tip_rad_s_1", "rad/s"),
+        ("gauge_rad_0", "rad"),
+    ]
+    units = {"target_rate_rad_s": "rad/s", "command_v": "V"}
+    assert [(p.name, p.unit) for p in made.outputs] == [
+        (f"{kind}_{i}", units.get(kind, "rad")) for kind in kinds for i in range(3)
+    ]
+    assert (made.period_s, made.anti_windup, [p.name for p in made.states]) == (
+        4e-4,
+        "windup",
+        ["controller_state_0", "controller_state_1"],
+    )
