@@ -6,6 +6,7 @@ import pickle
 import re
 import struct
 import sys
+import tomllib
 from dataclasses import fields, replace
 from types import SimpleNamespace
 
@@ -1017,3 +1018,84 @@ def test_an_input_is_in_volts_where_its_unit_is_one_word(stated, taken):
         ExportError, match=r"^a source: its input is in (rad|m), and a mirror's drive is in V; choose the"
     ):
         roots_module.roots_of_fields(fields, "a source")
+
+
+@pytest.mark.parametrize(
+    ("zeros", "poles", "why"),
+    [
+        ([], [-300.0, -2e-10], r"an integrator, a pole at 3\.18e-11 Hz; a mirror comes to rest"),
+        ([], [-300.0, -4e-10], ""),
+        ([], [-1e-3, -1.001e-3, -3e6], ""),
+        ([], [-3e6, -1e-3, -1e-3 * (1.0 + 5e-10)], r"two poles coincide at 0\.0001592 Hz"),
+        ([-1.001e-3], [-3e6, -1e-3, -1e-1], ""),
+        ([-3e6, -1e-1 * (1.0 + 5e-9)], [-1e-3, -2e6, -1e-1], r"a zero cancels the pole at 0\.01592 Hz"),
+        ([2.0, 0.0], [-1.0, -2.0, -3.0], "a zero at 0 Hz"),
+        ([], [-1.0, complex(0.0, 5.0), complex(0.0, -5.0)], r"unstable, a pole at 0\.7958 Hz"),
+    ],
+)
+def test_roots_are_apart_by_a_share_of_their_own_size_and_at_rest_by_one_of_the_largest(zeros, poles, why):
+    of = roots_module.Roots(np.array(zeros, dtype=complex), np.array(poles, dtype=complex), 2.0)
+    if not why:
+        assert roots_module.checked(of, "a source") is of
+        return
+    with pytest.raises(ExportError, match=f"^a source: (not minimal, )?{why}"):
+        roots_module.checked(of, "a source")
+
+
+def test_roots_of_one_size_stand_by_their_damping_the_largest_first():
+    found = np.array([complex(-300, 400), complex(-300, -400), -500.0, complex(-480, 140), complex(-480, -140), 500.0])
+    for order in ([0, 1, 2, 3, 4, 5], [5, 4, 3, 2, 1, 0]):
+        frequencies, dampings = mirror_file._roots("zero", found[order], "a source")
+        assert frequencies.count("79.577") == 4 and frequencies.endswith("] # a source")
+        numbers = re.search(r"= \[(.*)\]", dampings)[1].split(", ")
+        assert [float(each) for each in numbers] == pytest.approx([1.0, 0.96, 0.6, -1.0])
+
+
+def test_what_is_no_system_may_lie_beside_one(tmp_path):
+    """A sparse matrix, text and an array of structures of another kind: none of them is asked for."""
+    others = np.array([(1, 2), (3, 4)], dtype=[("time", "O"), ("angle", "O")])
+    path = save(tmp_path, grid=csc_array(np.eye(3)), note="text", records=others, tip=SHAPES["roots"])
+    assert difference(answer(tmp_path, import_mat(path, GIVEN), BAND), by_roots(BAND)) < NINE_DIGITS
+    assert "imported from model.mat, tip:" in import_mat(path, GIVEN, "tip")
+
+
+def test_of_many_variables_without_a_system_the_first_twenty_are_told(tmp_path):
+    names = [f"v{n}" for n in range(23)]
+    told = message(tmp_path, dict.fromkeys(names, 1.0))
+    assert told == (
+        f"(folder)/model.mat has no linear system; it holds {', '.join(names[:20])}, and none with A B C D, z p k or "
+        "num den: save one of these forms"
+    )
+
+
+@pytest.mark.parametrize(
+    "error", [ZeroDivisionError("division by zero"), OverflowError("too large"), ValueError("odd")]
+)
+def test_numbers_that_cannot_be_worked_with_are_told_with_the_reason(tmp_path, monkeypatch, error):
+    def broken(*given):
+        raise error
+
+    monkeypatch.setattr(mirror_file, "roots_of_fields", broken)
+    assert message(tmp_path, {"tip": SHAPES["roots"]}) == (
+        f"(folder)/model.mat, tip: its numbers cannot be worked with ({error}); look for sizes that no mirror has, or "
+        "save zeros, poles and gain"
+    )
+
+
+def test_a_name_with_characters_that_toml_has_not_is_written_so_that_it_reads_back(tmp_path):
+    name = 'a\x7fb\\c "d" \u00b5\x1f'
+    text = import_mat(save(tmp_path, **SHAPES["roots"]), replace(GIVEN, name=name))
+    assert "\x7f" not in text and "\x1f" not in text and "\u00b5" in text
+    assert tomllib.loads(text)["name"] == name
+
+
+def test_a_refusal_of_an_object_has_the_name_that_was_said_of_it():
+    two = python_control.ss(-np.eye(2), np.eye(2), np.ones((1, 2)), 0)
+    with pytest.raises(
+        ExportError, match=r"^our rig: 2 inputs and 1 output; a mirror file has one drive and one angle"
+    ):
+        import_control(two, GIVEN, "our rig")
+    with pytest.raises(ExportError, match=r"^our rig: unstable, a pole at"):
+        import_control(python_control.tf([1.0], [1.0, -5.0]), GIVEN, "our rig")
+    with pytest.raises(ExportError, match=r"^our rig: a float; give a control\.StateSpace or a control\.TransferF"):
+        import_control(2.0, GIVEN, "our rig")
