@@ -4,6 +4,7 @@ import importlib.metadata
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -1247,3 +1248,95 @@ def test_a_loop_takes_each_reading_from_where_it_is_measured():
         "controller 'PI' reads star, moon, which a loop does not measure: it has optical_error_rad, gauge_rad, "
         "reading_rad, reference_rad"
     )
+
+
+# ----------------------------------------------------------------------- a compiler that does not come through
+@pytest.mark.parametrize(
+    ("raised", "reason"),
+    [
+        (subprocess.TimeoutExpired(["mycc", "x"], 300.0), "timed out after 300.0 seconds"),
+        (PermissionError(13, "Permission denied"), "Permission denied"),
+    ],
+)
+def test_a_compiler_that_does_not_end_or_begin_is_told_with_the_version(monkeypatch, raised, reason):
+    def broken(command, **more):
+        raise raised
+
+    monkeypatch.setattr(fmu, "compiler_words", lambda: ("mycc", "-m64"))
+    monkeypatch.setattr(fmu.subprocess, "run", broken)
+    with pytest.raises(ExportError) as told:
+        fmu._library({"sources/a.c": "int a;"}, "3.0", "mirror")
+    assert str(told.value).startswith("the C compiler 'mycc' cannot compile the FMI 3.0 unit: ")
+    assert reason in str(told.value) and told.value.__cause__ is raised
+
+
+@pytest.mark.parametrize(("ending", "shared"), [(".so", True), (".dylib", True), (".dll", False)])
+def test_the_sources_of_a_unit_are_compiled_in_their_order_into_a_library_of_its_name(monkeypatch, ending, shared):
+    asked = []
+
+    def compiled(command, cwd, timeout, **more):
+        asked.append((command, sorted(each.name for each in cwd.iterdir()), timeout))
+        (cwd / command[command.index("-o") + 1]).write_bytes(b"library")
+        return SimpleNamespace(returncode=0, stderr="")
+
+    monkeypatch.setattr(fmu, "compiler_words", lambda: ("mycc", "-m64"))
+    monkeypatch.setattr(fmu, "_ending", lambda: ending)
+    monkeypatch.setattr(fmu.subprocess, "run", compiled)
+    texts = {"sources/b.c": "2", "sources/b.h": "h", "modelDescription.xml": "<x/>", "sources/a.c": "1"}
+    assert fmu._library(texts, "2.0", "tip") == b"library"
+    ((command, files, timeout),) = asked
+    flags = [each for each in fmu.SHARED if shared or each != "-fPIC"]
+    assert command == ["mycc", "-m64", *flags, "-o", f"tip{ending}", "a.c", "b.c", "-lm"]
+    assert (files, timeout) == (["a.c", "b.c", "b.h"], fmu.TIME_LIMIT_S)
+
+
+@pytest.mark.parametrize("count", [1, 12, 15])
+def test_a_compiler_that_refuses_is_shown_by_its_first_twelve_lines(monkeypatch, count):
+    lines = [f"line {n}" for n in range(count)]
+    done = SimpleNamespace(returncode=1, stderr="\n".join(lines) + "\n")
+    monkeypatch.setattr(fmu, "compiler_words", lambda: ("mycc",))
+    monkeypatch.setattr(fmu.subprocess, "run", lambda command, **more: done)
+    with pytest.raises(ExportError) as told:
+        fmu._library({}, "2.0", "tip")
+    first, *shown = str(told.value).split("\n")
+    assert first == "the C compiler 'mycc' refuses the FMI 2.0 unit 'tip':"
+    assert shown == [f"  {each}" for each in lines[:12]]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_unit_that_differs_in_one_text_or_the_name_of_a_file_has_another_guid(monkeypatch, version):
+    code = {"a_unit.c": "1", "a_unit.h": "2"}
+    guids = []
+    for changed in (
+        code,
+        code,
+        {"a_unit.c": "12", "a_unit.h": ""},
+        {"a_unit.h": "1", "a_unit.c": "2"},
+        {**code, "b.h": ""},
+    ):
+        monkeypatch.setattr(fmu, "unit_code", lambda unit, version, name, changed=changed: changed)
+        texts, guid = fmu._texts(UNITS["mirror"](), version, "a")
+        assert re.fullmatch(r"\{[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}\}", guid)
+        assert all(guid in texts[file] for file in ("modelDescription.xml", f"sources/fmi{version[0]}.c"))
+        assert {f"sources/{file}" for file in (*changed, *fmu.HEADERS[version])} < set(texts)
+        guids.append(guid)
+    assert guids[0] == guids[1] and len(set(guids)) == 4
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_description_has_the_steps_of_its_unit_and_each_unknown_by_its_place(monkeypatch, version):
+    given = {}
+    monkeypatch.setattr(description, "render", lambda template, **values: given.update(values) or template)
+    loop = UNITS["loop"]()
+    loop = replace(loop, plant=rich_unit(), controller=replace(loop.controller, period_s=4e-4))
+    for unit, step_s in ((loop, 4e-4), (rich_unit(), 2e-5)):
+        template = description.model_description(unit, version, "tip", "{guid}", ("a.c", "b.c"))
+        assert template == f"model_description_{version[0]}.xml.j2"
+        assert (given["step_s"], given["plant_step_s"]) == (step_s, pytest.approx(2e-5))
+        assert (given["name"], given["guid"], given["compiled"]) == ("tip", "{guid}", ("a.c", "b.c"))
+        listed = given["variables"]
+        assert [listed[i].name for i, _ in given["unknowns"]] == [v.name for v in listed if v.causality == "output"]
+        behind = {listed[i].name: [listed[d].name for d in others] for i, others in given["unknowns"] if others}
+        axes = range(1, 4) if unit is loop else ()
+        ends = [""] * bool(axes) if version == "3.0" else [f"[{i}]" for i in axes]
+        assert behind == {f"error_rad{end}": [f"reference_rad{end}", f"disturbance_rad{end}"] for end in ends}
