@@ -922,3 +922,33 @@ def test_a_converter_has_the_scale_of_its_own_command(monkeypatch):
     assert fixed.output_scale == (11, 15)
     for scale, each in zip(fixed.output_scale, fixed.converter, strict=True):
         assert each.factor * 2.0**-each.shift == pytest.approx(2.0**-scale / of.resolution_v, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({}, ""),
+        ({"state_shift": (5, -3), "output_shift": (-7, 0)}, "the numbers of a row are 2^7 beyond the range of its sum"),
+        ({"state_shift": (-2, 5)}, "the numbers of a row are 2^2 beyond the range of its sum"),
+        ({"state_shift": (), "output_shift": ()}, ""),
+        ({"converter": (1, 63)}, "a count of its converter, or a number in the run, is nothing beside its words"),
+        ({"converter": (0, 62)}, "a count of its converter, or a number in the run, is nothing beside its words"),
+        ({"input_scale": (3, 1001)}, "a count of its converter, or a number in the run, is nothing beside its words"),
+        ({"state_scale": (1001, 3)}, "a count of its converter, or a number in the run, is nothing beside its words"),
+        ({"converter": ()}, ""),
+    ],
+)
+def test_a_number_that_is_beyond_a_word_is_told_wherever_it_stands(changes, why):
+    given = {"state_shift": (0, 4), "output_shift": (3, 0), "converter": (1, 62), **changes}
+    given = {"input_scale": (7, 1000), "state_scale": (1000, -5), **given}
+    given["converter"] = [SimpleNamespace(shift=shift) for shift in given["converter"]]
+    form = SimpleNamespace(bits=12, **given)
+    if not why:
+        fixed_point._refuse_what_does_not_fit(SimpleNamespace(name="PI"), form)
+        return
+    with pytest.raises(ExportError) as told:
+        fixed_point._refuse_what_does_not_fit(SimpleNamespace(name="PI"), form)
+    assert str(told.value) == (
+        f"controller 'PI' does not fit into words of 12 bits: {why}; give more bits (up to 32), or export single "
+        "precision"
+    )

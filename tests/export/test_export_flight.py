@@ -1,6 +1,8 @@
 """Flight code: compiled, replayed against the kernel, fed with garbage, and read as a reviewer would."""
 
 import ctypes
+import hashlib
+import json
 import os
 import re
 import shutil
@@ -1563,3 +1565,57 @@ def test_margins_of_a_report_have_three_digits_in_their_own_unit(value, unit, sa
     of = made_export(controller=made_controller(margins=(("first", 2.0, ""), ("last", value, unit))))
     (line,) = (each for each in flight_write.report_text(of).splitlines() if each.startswith("  margins "))
     assert line == f"  margins       first 2, last {said}"
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize("compiles", [True, False])
+def test_an_export_has_its_texts_alone_with_their_hashes_and_is_told_step_by_step(
+    tmp_path, monkeypatch, fixed, compiles
+):
+    of, told, asked = made_controller(), [], []
+    source = choice.Source(tmp_path / "deep" / "my day.toml", of.origin, None, 6.125)
+    files = {"tip.c": "1", "tip.h": "2", "tip_fixed.c": "3", "tip_bench.c": "4", "Makefile": "\u00b5"}
+    form = SimpleNamespace(order=2, form="modal")
+
+    def compiled(folder, code):
+        asked.append(("bench", code, sorted(each.name for each in folder.iterdir())))
+        (folder / "tip_bench").write_bytes(b"\0")
+        (folder / "tip.o").write_bytes(b"\0")
+        return "bench"
+
+    answers = {
+        "promised": lambda chosen, accept: asked.append(("promised", accept)) or "left",
+        "flight_controller": lambda chosen: of,
+        "sections": lambda controller: form,
+        "vectors": lambda chosen, samples: f"a run of {samples}",
+        "within_limits": lambda controller, run: f"{run} within",
+        "_code": lambda *given: asked.append(given) or (files, "cost", "bound", "fixed" if fixed else None),
+        "vectors_text": lambda controller, run: f"{run}\n",
+        "compiler": lambda: "cc" if compiles else None,
+        "compile_and_run": compiled,
+        "stack_use": lambda folder, sources, step: asked.append(("stack", sources, step)) or "stack",
+        "report_text": lambda found: f"in words: {found.bench} {found.stack}",
+    }
+    for name, answer in answers.items():
+        monkeypatch.setattr(flight_write, name, answer)
+    precision = "fixed" if fixed else "single"
+    found = export_flight(
+        SimpleNamespace(source=source), tmp_path / "out", name="tip", precision=precision, samples=77, accept=True,
+        on_progress=lambda *given: told.append(given),
+    )  # fmt: skip
+    steps = ["recording 77 samples of the loop", "compiling and running the bench", "writing"]
+    assert told == [(done, 3, step) for done, step in enumerate(steps)]
+    code = "tip_fixed" if fixed else "tip"
+    ran = [("bench", code, sorted([*files, "vectors.csv"])), ("stack", ["tip.c", "tip_fixed.c"], f"{code}_step")]
+    assert asked == [("promised", True), (of, form, "a run of 77 within", "tip", precision), *ran * compiles]
+    assert (found.left, found.cost, found.bound, found.samples) == ("left", "cost", "bound", 77)
+    assert (found.bench, found.stack) == (("bench", "stack") if compiles else (None, None))
+    texts = {**files, "vectors.csv": "a run of 77 within\n", "report.txt": f"in words: {found.bench} {found.stack}\n"}
+    written = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    manifest = json.loads(written.pop("manifest.json"))
+    assert written == {name: text.encode() for name, text in texts.items()}
+    assert manifest["files_sha256"] == {name: hashlib.sha256(written[name]).hexdigest() for name in sorted(texts)}
+    kind = {"kind": "flight code", "name": "tip", "controller": "PI \u00fcber alles", "precision": precision}
+    mission_ = {"file": "my day.toml", "sha256": "0123456789abcdef" * 4, "name": "a mission"}
+    assert (manifest["export"], manifest["mission"], manifest["samples"]) == (kind, mission_, 77)
+    assert [*manifest["versions"]] == ["python", "microrad", "numpy", "scipy", "numba", "jinja2"]
