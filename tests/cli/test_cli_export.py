@@ -16,6 +16,7 @@ from microrad.export import matrices as linear
 from microrad.export.flight import build, write
 from microrad.export.fmi import fmu
 from microrad.export.linear_import import Given
+from microrad.export.records import ExportError
 from microrad.loop import controller_study
 from microrad.mission.file import load_mirror, load_mission
 from shipped import SHIPPED, without_fine_pointing
@@ -493,3 +494,54 @@ def test_a_mirror_is_sought_from_the_folder_of_work(monkeypatch):
     assert cli_export._loaded(Path("days/day.toml"), Path("mine/mirror.toml")) == ("mission", None)
     assert cli_export._loaded(Path("days/day.toml"), None) == ("mission", None)
     assert asked == [(Path("days/day.toml"), Path("mine/mirror.toml")), (Path("days/day.toml"), None)]
+
+
+@pytest.mark.parametrize(
+    ("command", "taken"),
+    [("c", "day-pi_inverse"), ("fmu", "day-mirror.fmu"), ("matrices", "day.mat")],
+)
+@pytest.mark.parametrize("overwrite", [(), ("--overwrite",)])
+def test_what_must_stay_is_refused_before_anything_is_designed(
+    refused, folder, loaded, monkeypatch, command, taken, overwrite
+):
+    loaded("loop")
+    for name in ("choose", "choose_coupled", "plant_unit", "source"):
+        monkeypatch.setattr(choice, name, lambda *given: pytest.fail("it was designed"))
+    (folder / taken).mkdir()
+    (folder / taken / "thesis.txt").write_text("mine", encoding="utf-8")
+    said = refused("export", command, "sub/day.toml", *overwrite)
+    assert said.startswith(f"microrad: {taken}")
+
+
+@pytest.mark.parametrize("command", ["c", "fmu", "matrices"])
+def test_a_folder_that_is_not_there_is_told_and_a_mission_that_cannot_be_read_too(refused, folder, command):
+    assert "nowhere.toml" in refused("export", command, "nowhere.toml", "--output", "x")
+    (folder / "broken.toml").write_text("[mirror\n", encoding="utf-8")
+    assert "broken.toml" in refused("export", command, "broken.toml", "--output", "x")
+
+
+@pytest.mark.parametrize(("accept", "as_json"), [((), ()), (("--accept",), ("--json",))])
+def test_a_controller_of_matrices_and_of_a_unit_is_held_to_its_promise(
+    call, refused, folder, loaded, monkeypatch, accept, as_json
+):
+    asked = []
+
+    def promised(chosen, accepted):
+        asked.append((chosen, accepted))
+        if not accepted:
+            raise ExportError("m.toml: it leaves too much")
+
+    loaded("loop", "axes")
+    monkeypatch.setattr(cli_export, "_chosen", lambda mission, several, name, progress: (name, several))
+    monkeypatch.setattr(choice, "promised", promised)
+    monkeypatch.setattr(choice, "loop_unit", lambda chosen: chosen)
+    monkeypatch.setattr(linear, "models", lambda of: [SimpleNamespace(name=str(of))])
+    monkeypatch.setattr(linear, "json_text", lambda found: found[0].name)
+    monkeypatch.setattr(fmu, "write_unit", lambda unit, *more: SimpleNamespace(words=f"unit of {unit}"))
+    for command, form, out in (("matrices", as_json, "{}"), ("fmu", (), "unit of {}")):
+        given = ("export", command, "day.toml", "--controller", "LQG", *accept, *form)
+        if accept:
+            assert call(*given) == (0, f"{out.format(('LQG', 'axes'))}\n", "")
+        else:
+            assert refused(*given) == "microrad: m.toml: it leaves too much (see docs/export.md)\n"
+    assert asked == [(("LQG", "axes"), bool(accept))] * 2

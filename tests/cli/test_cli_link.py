@@ -6,6 +6,7 @@ import json
 import math
 import re
 import shlex
+from types import SimpleNamespace
 
 import pytest
 import typer
@@ -13,6 +14,7 @@ import typer
 from command_line import listing
 from link_files import PATTERN, RECEIVERS, data_with, received_with, written
 from microrad import cli
+from microrad.cli import link as cli_link
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
@@ -572,3 +574,84 @@ def test_the_help_names_every_flag(call):
     text = call("budget", "--help").out
     for flag in ("--data-rate RATE", "--pointing-error ANGLE", "--solve KEY", "--csv", "--html", "--json"):
         assert flag in text
+
+
+# ----------------------------------------------------------------------------------------------- handed on, one by one
+@pytest.mark.parametrize(
+    "given", [(), ("--solve", "a.key"), ("--standard", "sda"), ("--standard", "sda", "--solve", "a.key")]
+)
+@pytest.mark.parametrize("form", [(), ("--verbose",), ("--json",), ("--csv",), ("--html",)])
+@pytest.mark.parametrize(("exit_on", "code"), [((), 1), (("closes",), 0)])
+def test_a_budget_in_each_form_has_what_was_solved_and_the_standard(call, monkeypatch, given, form, exit_on, code):
+    asked, study = [], SimpleNamespace(closes=True)
+    solved, against = ("a.key" if "--solve" in given else None), ("sda" if "--standard" in given else None)
+    found = SimpleNamespace(file="the solved file")
+    loaded = SimpleNamespace(mission=SimpleNamespace(jitter=None))
+    monkeypatch.setenv("COLUMNS", "97")
+    monkeypatch.setattr("microrad.mission.file.load_link", lambda file: asked.append(str(file)) or loaded)
+    monkeypatch.setattr(cli_link, "_changed", lambda file, rate, error: (file, rate, error))
+    monkeypatch.setattr(link_study, "solve_key", lambda given, key: asked.append((given, key)) or found)
+    monkeypatch.setattr(link_study, "run_link_study", lambda given: asked.append(given) or study)
+    monkeypatch.setattr("microrad.link.compliance.standard", lambda name: f"rules of {name}")
+    monkeypatch.setattr("microrad.link.compliance.compliance", lambda of, rules: (of is study, rules))
+    monkeypatch.setattr("microrad.link.requirement.met", lambda of: False)
+    told = (found if solved else None, (True, f"rules of {against}") if against else None)
+    budgets = "microrad.report.links"
+    monkeypatch.setattr(f"{budgets}.data.links_data", lambda of, *more: {"same": more == told})
+    monkeypatch.setattr(f"{budgets}.budgets.links_csv", lambda of, *more: f"csv {more == told}")
+    monkeypatch.setattr(f"{budgets}.views.links_page", lambda of, *more: f"<!page {more == told}>")
+    monkeypatch.setattr(
+        f"{budgets}.budgets.links_text",
+        lambda of, width, verbose, solution, against: f"{width} {verbose} {(solution, against) == told}",
+    )
+    options = ("--data-rate", "1 Gbit/s", "--pointing-error", "2 urad")
+    result = call("budget", "a/day.toml", *options, *given, *form, *(f"--exit-on={each}" for each in exit_on))
+    out = {"--json": '{\n  "same": true\n}', "--csv": "csv True", "--html": "<!page True>", "--verbose": "97 True True"}
+    assert (result.code, result.out) == (code, f"{out[form[0]] if form else '97 False True'}\n")
+    changed = (loaded, "1 Gbit/s", "2 urad")
+    assert asked == ["a/day.toml", *([(changed, solved), "the solved file"] if solved else [changed])]
+
+
+@pytest.mark.parametrize(
+    ("options", "part"),
+    [
+        (("--solve", "a.key"), "microrad.link.study.solve_key"),
+        ((), "microrad.link.study.run_link_study"),
+        (("--standard", "sda"), "microrad.link.compliance.compliance"),
+    ],
+)
+def test_a_budget_that_cannot_be_made_is_refused_with_its_file(refused, folder, monkeypatch, options, part):
+    def cannot(*given):
+        raise ValueError("no light arrives")
+
+    if part.endswith("compliance"):
+        monkeypatch.setattr(link_study, "run_link_study", lambda given: "study")
+    monkeypatch.setattr(part, cannot)
+    path = file_with(folder)
+    assert refused("budget", path, *options) == f"microrad: {path}: no light arrives\n"
+
+
+def test_a_standard_that_there_is_not_is_refused_under_its_option_before_any_file_is_read(refused, folder):
+    assert refused("budget", "nowhere.toml", "--standard", "sdaa").startswith("microrad: --standard: ")
+
+
+@pytest.mark.parametrize(
+    ("given", "there", "advice"),
+    [
+        (("--preset", "click"), "click.toml", "name another one: microrad init --preset click other.toml"),
+        (
+            ("--preset", "click", "my link.toml"),
+            "my link.toml",
+            "name another one: microrad init --preset click other.toml",
+        ),
+        ((), "leo-geo.toml", "name another one (microrad init other.toml) or go on with `microrad run leo-geo.toml`"),
+        (
+            ("my day.toml",),
+            "my day.toml",
+            "name another one (microrad init other.toml) or go on with `microrad run 'my day.toml'`",
+        ),
+    ],
+)
+def test_a_mission_that_is_there_is_left_with_what_to_do_instead(refused, folder, given, there, advice):
+    (folder / there).write_text("", encoding="utf-8")
+    assert refused("init", *given) == f"microrad: {there} exists and is left as it is; {advice}.\n"

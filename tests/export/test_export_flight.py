@@ -1619,3 +1619,26 @@ def test_an_export_has_its_texts_alone_with_their_hashes_and_is_told_step_by_ste
     mission_ = {"file": "my day.toml", "sha256": "0123456789abcdef" * 4, "name": "a mission"}
     assert (manifest["export"], manifest["mission"], manifest["samples"]) == (kind, mission_, 77)
     assert [*manifest["versions"]] == ["python", "microrad", "numpy", "scipy", "numba", "jinja2"]
+
+
+@pytest.mark.parametrize(
+    ("inverse", "forward", "share"),
+    [
+        (None, None, 1e-12),
+        ([[0.0], [0.0]], None, 1e-12),
+        ([[0.0], [0.5]], None, 1e-10),
+        (None, [[0.0], [0.7]], 1e-10),
+        ([[0.0]], [[-0.25]], 1e-10),
+        ([[0.5]], [[0.0]], 1e-10),
+        (np.zeros((0, 1)), np.zeros((0, 1)), 1e-12),
+    ],
+)
+def test_the_share_that_code_may_differ_by_is_larger_with_any_exponent_that_is_not_one(inverse, forward, share):
+    def law(powers):
+        if powers is None:
+            return None
+        rows = np.full((len(powers), kernels.POWER + 1), 3.0)
+        rows[:, kernels.POWER :] = powers
+        return SimpleNamespace(bouc_wen=rows)
+
+    assert c_code.bound_share(SimpleNamespace(inverse=law(inverse), forward=law(forward))) == share
