@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -172,3 +173,53 @@ def test_a_recording_is_read_by_what_the_options_say_of_it(refused, monkeypatch,
     monkeypatch.setattr("microrad.lab.recording.read_motion", read)
     assert refused("jitter", DEFAULT, "sub/j.csv", *options) == "microrad: read\n"
     assert asked == [("sub/j.csv", names, rate_hz, time, unit)]
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_each_axis_of_a_recording_is_taken_through_the_controller_that_is_asked_for(call, monkeypatch, as_json):
+    motion = Motion("sub/my jitter.csv", "5ha", ("x", "y", "z"), np.zeros((2, 3)), 250.0)
+    scene = SimpleNamespace(axis="axis", table=SimpleNamespace(settle_s=0.75))
+    designed = SimpleNamespace(name="LQG as designed")
+    monkeypatch.setattr("microrad.lab.recording.read_motion", lambda *given, **more: motion)
+    monkeypatch.setattr("microrad.loop.controller_study.scene", lambda *given: scene)
+    monkeypatch.setattr("microrad.loop.controller_study.design", lambda scene, progress, names: (designed,))
+    monkeypatch.setattr("microrad.loop.controller_study.on_one_axis", lambda made, scene: f"{made.name} alone")
+    monkeypatch.setattr(cli_jitter, "_fits", lambda motion, settle_s, progress: [f"fit of {n}" for n in motion.names])
+    monkeypatch.setattr("microrad.loop.pointing_loop.played.recorded_residual", lambda *given: given)
+    told = "microrad.report.fine_pointing.recording"
+    monkeypatch.setattr(f"{told}.recording_data", lambda *given: given)
+    monkeypatch.setattr(f"{told}.recording_text", lambda *given: repr(given))
+    monkeypatch.setattr(f"{told}.RecordedAxis", lambda fit, left: [fit, left])
+    monkeypatch.setenv("COLUMNS", "99")
+    result = call("jitter", DEFAULT, "j.csv", "--controller", "LQG", *["--json"] * as_json)
+    axes = [[f"fit of {n}", ("axis", "LQG as designed alone", f"fit of {n}", 0.75)] for n in "xyz"]
+    assert result.code == 0
+    if as_json:
+        data = json.loads(result.out)
+        assert [*data] == ["mission_sha256", "controller", "recording"] and data["controller"] == "LQG as designed"
+        left = [[fit, list(each)] for fit, each in axes]
+        assert data["recording"] == ["sub/my jitter.csv", "5ha", left, "axis"]
+    else:
+        assert result.out == f"{('sub/my jitter.csv', axes, 'axis', 'LQG as designed', 99)!r}\n"
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "microrad.loop.controller_study.scene",
+        "microrad.loop.controller_study.design",
+        "microrad.loop.pointing_loop.played.recorded_residual",
+    ],
+)
+def test_a_loop_that_a_recording_cannot_be_taken_through_is_refused_with_the_mission(refused, monkeypatch, part):
+    def cannot(*given):
+        raise ValueError("it cannot be")
+
+    scene = SimpleNamespace(axis="axis", table=SimpleNamespace(settle_s=0.75))
+    monkeypatch.setattr("microrad.lab.recording.read_motion", lambda *given, **more: None)
+    monkeypatch.setattr("microrad.loop.controller_study.scene", lambda *given: scene)
+    monkeypatch.setattr("microrad.loop.controller_study.design", lambda *given: ("made",))
+    monkeypatch.setattr("microrad.loop.controller_study.on_one_axis", lambda *given: "alone")
+    monkeypatch.setattr(cli_jitter, "_fits", lambda *given: ["fit"])
+    monkeypatch.setattr(part, cannot)
+    assert refused("jitter", DEFAULT, "j.csv") == f"microrad: {DEFAULT}: it cannot be\n"

@@ -834,3 +834,62 @@ def test_warnings_of_several_axes_are_broken_promises_then_what_is_left_out_then
         and " is left, simulated on the mission's mirror, by PI (1.75 times), H2 (2.00 times): " in broken
     )
     assert others == ["no drift", "no creep", "no Youla here", "no Glover here"]
+
+
+@pytest.mark.parametrize(
+    ("holds", "code"), [((True, None), 0), ((), 0), ((True, False, None), 1), ((False, True), 1), ((None,), 0)]
+)
+@pytest.mark.parametrize("as_json", [False, True])
+def test_windows_runs_and_budget_stand_behind_each_other_and_a_limit_that_is_not_kept_is_exit_1(
+    call, monkeypatch, holds, code, as_json
+):
+    asked = []
+    judged = SimpleNamespace(judged=[SimpleNamespace(total=SimpleNamespace(holds=each)) for each in holds])
+    scene = SimpleNamespace(theory="theory", loop="loop")
+    wide = "microrad.report"
+    parts = {
+        "microrad.cli.pointing.indices_of_mission": lambda table, windows, spacings: ["short", "long"],
+        "microrad.cli.pointing.stated_beside": lambda mission, listed, indices: (
+            asked.append((str(listed), indices)) or SimpleNamespace(with_loop=True)
+        ),
+        "microrad.cli.pointing._designed": lambda mission, name: asked.append(name) or (scene, f"made {name}"),
+        "microrad.cli.pointing._fitting": lambda scene, indices: (indices[:1], indices[1:]),
+        "microrad.cli.pointing._simulated": lambda mission, scene, made, indices, runs: (
+            asked.append((made, indices, runs)) or ("errors of runs", "lost", "coded")
+        ),
+        "microrad.loop.pointing_loop.linear.close": lambda theory, made: f"{theory} with {made}",
+        "microrad.loop.pointing_loop.windows.windowed_errors": lambda closed, indices: (closed, *indices),
+        "microrad.link.error_budget.assembly.judge": lambda stated, closed: asked.append(closed) or judged,
+        f"{wide}.fine_pointing.words.arrival": lambda loop: f"arrival at {loop}",
+        f"{wide}.fine_pointing.data.arrival": lambda scene: {"arrival": 1},
+        f"{wide}.fine_pointing.windows.windows_data": list,
+        f"{wide}.fine_pointing.windows.windows_text": lambda errors, name, width, said: f"\n{name} {width} {said}\n\n",
+        f"{wide}.fine_pointing.simulated_windows.simulated_data": lambda *found: list(found),
+        f"{wide}.fine_pointing.simulated_windows.simulated_view": lambda *found: SimpleNamespace(blocks=found),
+        f"{wide}.error_budget.data.budget_data": lambda found: {"same": found is judged},
+        f"{wide}.error_budget.page.budget_view": lambda found: SimpleNamespace(blocks=["budget", found is judged]),
+        f"{wide}.view.views_text": lambda blocks, width: f"\n{blocks} at {width}\n",
+    }
+    for name, part in parts.items():
+        monkeypatch.setattr(name, part)
+    monkeypatch.setenv("COLUMNS", "99")
+    options = ("--controller", "LQG", "--sources", "errors.csv", "--simulate", "5")
+    result = call("pointing", DEFAULT, *options, *["--json"] * as_json)
+    assert asked == [
+        ("errors.csv", ["short", "long"]),
+        *("LQG", ("made LQG", ["short"], 5), "theory with made LQG"),
+    ]
+    runs = ["errors of runs", "lost", 5, ["long"], "coded"]
+    assert result.code == code
+    if not as_json:
+        assert result.out == f"LQG 99 arrival at loop\n\n{tuple(runs)} at 99\n\n['budget', True] at 99\n"
+        return
+    data = json.loads(result.out)
+    assert data.pop("mission_sha256") == load_mission(DEFAULT).sha256
+    assert [*data.items()] == [
+        ("controller", "LQG"),
+        ("indices", ["theory with made LQG", "short", "long"]),
+        ("arrival", 1),
+        ("simulated", runs),
+        ("budget", {"same": True}),
+    ]
