@@ -34,6 +34,7 @@ from microrad.export.matrices.models import (
     SAMPLED_PLANT,
     _controller,
     _coupled_models,
+    _mirror_models,
     _pointing_models,
     axis_plant,
 )
@@ -1188,4 +1189,48 @@ def test_a_controller_says_its_limits_and_has_an_output_of_each_kind_for_each_ac
         4e-4,
         "windup",
         ["controller_state_0", "controller_state_1"],
+    )
+
+
+def test_models_of_a_mirror_say_where_its_gain_is_taken_and_the_bias_that_they_count_from(file):
+    of = choice.source(file)
+    table = of.mirror
+    linear = table.linear.model_copy(update={"normalise_at_hz": 3.25})
+    part, whole = _mirror_models(replace(of, mirror=table.model_copy(update={"linear": linear, "bias_v": 5.5})))
+    at = 2j * np.pi * 3.25
+    size = abs(np.polyval(linear.numerator, at) / np.polyval(linear.denominator, at))
+    assert part.meaning == (
+        f"linear part of the mirror, divided by its gain at 3.25 Hz ({size:.6g}); it takes what the hysteresis makes "
+        "of the drive"
+    )
+    assert whole.meaning == (
+        "mirror from drive to angle, its hysteresis at its slow gain; both count from rest at 5.5 V"
+    )
+    ports = [[(p.name, p.unit) for p in (*m.inputs, *m.outputs)] for m in (part, whole)]
+    assert ports == [[("hysteresis_rad", "rad"), ("mirror_rad", "rad")], [("drive_v", "V"), ("mirror_rad", "rad")]]
+    assert [p.name for p in part.states] == [f"mode_{i}" for i in range(part.system.order)]
+    assert [p.name for p in whole.states] == [f"mirror_state_{i}" for i in range(whole.system.order)]
+    assert {p.unit for p in (*part.states, *whole.states)} == {"1"} and (part.period_s, whole.period_s) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("poles", "period_s", "worst"),
+    [
+        ([complex(40.0, 300.0), complex(40.0, -300.0), 0.25], 0.0, "0.03979 Hz with a damping ratio of -1"),
+        (
+            [complex(2.0, 3.0), complex(2.0, -3.0), complex(1.0, 9.0), complex(1.0, -9.0)],
+            0.0,
+            "0.5738 Hz with a damping",
+        ),
+        ([0.5, 1.02, -1.25, 1.1], 0.01, "|z| = 1.25 at 50 Hz"),
+        ([complex(0.9, 0.9), complex(0.9, -0.9), 1.2], 0.01, "|z| = 1.27279221 at 12.5 Hz"),
+    ],
+)
+def test_of_several_unstable_poles_the_worst_is_told(poles, period_s, worst):
+    system = lti.modal_from_residues(np.array(poles, dtype=complex), np.array([1.0] * len(poles), dtype=complex))
+    with pytest.raises(ExportError) as told:
+        structure.refuse_unstable(system, period_s, "a loop")
+    assert str(told.value).startswith(f"a loop: unstable, {worst}")
+    assert str(told.value).endswith(
+        ". Coefficients would hide it; take the state space or zeros and poles, or export a stable model"
     )
