@@ -2498,3 +2498,108 @@ def test_the_studio_says_where_it_is_and_opens_it_if_it_can(monkeypatch, capsys,
     out, err = capsys.readouterr()
     assert out == "http://x\n" and err.startswith(said) and bool(err) is bool(said)
     assert opened == ([("open", ("studio http://x",), True), "started"] if browser and not raised else [])
+
+
+def test_different_units_of_one_file_are_told_in_order_with_the_first_file_of_each():
+    given = recordings.Given(
+        (
+            named("a.csv", {"input_units": ("mV", "V"), "output_units": ("urad", "rad", "arcsec", "mrad")}),
+            named("b.csv", {"input_units": ("", " V "), "output_units": ("um", "rad")}),
+        ),
+        (named("c.csv", {"input_units": ("V",), "output_units": ("deg", "um")}),),
+    )
+    for which, units in (
+        ("output", "arcsec (a.csv), mrad (a.csv), rad (a.csv), urad (a.csv), um (b.csv), deg (c.csv)"),
+        ("input", "V (a.csv), mV (a.csv)"),
+    ):
+        with pytest.raises(frame.Refusal) as refusal:
+            recordings.unit_of(given, which, None, "mrad")
+        assert str(refusal.value) == (
+            f"the files say different units of the {which}, {units}: identify them apart, or convert them."
+        )
+    with pytest.raises(frame.Refusal) as refusal:
+        recordings.unit_of(given, "input", "V", "V")
+    assert str(refusal.value) == "--input-unit is V and the files say V, mV: give what the files say, or neither."
+
+
+@pytest.mark.parametrize(("static", "live", "as_json"), [(True, None, False), (False, "told", True)])
+def test_recordings_of_one_axis_are_fitted_and_reported_and_those_for_validation_are_beside_them(
+    folder, monkeypatch, static, live, as_json
+):
+    steps = []
+    given = recordings.Given(("first", "second"), ("unseen",), True, "listed", 0.05)
+    target = lab.Target(Path("m.toml"), Path("p.html"), "the title", True, lambda: steps.append("checked"))
+    how = lab._Fits(lab.Model.BOUC_WEN_CREEP, static, True, True, 0.0, 7)
+    found = SimpleNamespace(chosen="linear", unsupported="")
+    if live:
+        monkeypatch.setenv(frame.PROGRESS_FILE, live)
+    else:
+        monkeypatch.delenv(frame.PROGRESS_FILE, raising=False)
+
+    def fit(*args, **more):
+        assert callable(args[4])
+        steps.append((args[:4], more))
+        return found
+
+    def write(*args, **more):
+        assert not (folder / "m.toml").exists()
+        steps.append((args, more))
+
+    monkeypatch.setattr("microrad.lab.live_fit.live_fit_writer", lambda path: f"fits beside {path}")
+    monkeypatch.setattr(identify, "STATIC", ("pi", "bw", "more"))
+    monkeypatch.setattr(identify, "MODELS", ("pi", "bw", "more", "linear"))
+    monkeypatch.setattr(identify, "identify", fit)
+    monkeypatch.setattr(identify, "mirror_file_text", lambda found, title, model: f"# {title} {model}")
+    monkeypatch.setattr(report, "identification_text", lambda found, model, width, **files: f"{model} {[*files]}")
+    monkeypatch.setattr(report, "identification_data", lambda found, model, **files: {"model": model})
+    monkeypatch.setattr(report, "write_identification", write)
+    outcome = lab._identify_axis(given, ("mV", "um"), "said", target, how, as_json)
+    text = "said\n\nbouc_wen_creep ['mirror_file', 'report_file']"
+    assert (outcome.code, outcome.text) == (0, '{\n  "model": "bouc_wen_creep"\n}' if as_json else text)
+    models = ("pi", "bw", *(() if static else ("more", "linear")), "bouc_wen_creep")
+    options = {
+        "validation": ("unseen",),
+        "admissible": True,
+        "hold": "first-order",
+        "output_unit": "um",
+        "lever_arm_m": 0.05,
+        "input_unit": "mV",
+        "on_fit": f"fits beside {live}",
+        "side_by_side": live is None,
+    }
+    page = {
+        "mirror_file": Path("m.toml"),
+        "mirror_text": "# the title bouc_wen_creep",
+        "title": "the title",
+        "written": "bouc_wen_creep",
+        "recordings": ("first", "second"),
+        "overwrite": True,
+        "virtual": True,
+    }
+    first = ((("first", "second"), 0.0, 7, models), options)
+    assert steps == [first, "checked", ((found, Path("p.html")), page)]
+    assert (folder / "m.toml").read_text("utf-8") == page["mirror_text"]
+
+
+@pytest.mark.parametrize(
+    ("mirror", "page"),
+    [("x.toml", "./x.toml"), ("sub/../x.toml", "x.toml"), ("x.html", None), ("sub/x.toml", "sub/x.toml")],
+)
+def test_a_mirror_file_and_a_report_are_two_files_however_they_are_spelled(refused, folder, monkeypatch, mirror, page):
+    monkeypatch.setattr(lab, "given_recordings", lambda options: pytest.fail("it was read"))
+    (folder / "sub").mkdir()
+    said = refused("identify", "a.csv", "--mirror-file", mirror, *(() if page is None else ("--report", page)))
+    shown = Path(page or mirror)
+    assert said == (
+        f"microrad: {shown} cannot be both the mirror file and the report; name another one with --report.\n"
+    )
+
+
+@pytest.mark.parametrize("options", [("--lever-arm", "0 m"), ()])
+def test_a_lever_arm_of_nothing_is_one_that_was_given(refused, folder, monkeypatch, options):
+    """A list may state one, too: only one that is not there at all is none."""
+    given = recordings.Given((made_up(2, 2),), (), lever_arm_m=0.0)
+    monkeypatch.setattr(lab, "given_recordings", lambda options: given)
+    monkeypatch.setattr(lab, "unit_of", lambda *given: ("V", "given"))
+    monkeypatch.setattr(lab, "identify_channels", lambda *given: pytest.fail("it ran"))
+    assert refused("identify", "a.csv", *options).startswith("microrad: --lever-arm is for one drive and one output")
