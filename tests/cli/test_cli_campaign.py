@@ -616,3 +616,67 @@ def test_two_ways_to_work_are_refused_by_run_and_resume_before_anything(refused,
 def test_one_sound_chunk_is_told_as_one(call, monkeypatch):
     monkeypatch.setattr("microrad.campaign.ledger.verify", lambda path: mending.Verified(1, (), (), ()))
     assert call("campaign", "verify", "rows.ledger").out == "1 chunk with a right checksum\n"
+
+
+@pytest.mark.parametrize("command", ["run", "resume"])
+@pytest.mark.parametrize("within", ["the run", "what is shown"])
+def test_an_interrupt_of_a_run_or_of_what_it_shows_names_the_ledger(call, folder, monkeypatch, command, within):
+    def interrupt(*given, **more):
+        raise KeyboardInterrupt
+
+    (folder / "sub").mkdir()
+    (folder / "sub" / "my tails.ledger").touch()
+    for name in ("run_campaign", "resume_campaign"):
+        monkeypatch.setattr(run, name, interrupt if within == "the run" else lambda *given: None)
+    monkeypatch.setattr("microrad.campaign.statistics.summary.summarise_campaign", interrupt)
+    file = "sub/my tails.toml" if command == "run" else "sub/my tails.ledger"
+    shown = call("campaign", command, file)
+    go_on = "Go on with: microrad campaign resume 'sub/my tails.ledger'"
+    words = f"microrad: stopped; finished rows are in sub/my tails.ledger. {go_on}\n"
+    assert (shown.code, shown.out, shown.err) == (130, "", words)
+
+
+@pytest.mark.parametrize(("command", "file"), [("run", "c.toml"), ("resume", "c.ledger"), ("optimise", "c.toml")])
+def test_progress_of_many_rows_is_a_line_every_half_minute_in_a_log(call, monkeypatch, command, file):
+    asked = []
+
+    @contextmanager
+    def bar(line_s):
+        asked.append(line_s)
+        yield "progress"
+
+    found = SimpleNamespace(confirmed=True)
+    monkeypatch.setattr(cli_campaign, "progress_bar", bar)
+    monkeypatch.setattr(cli_campaign, "_shown", lambda path, as_json: Outcome("shown"))
+    for name in ("run_campaign", "resume_campaign"):
+        monkeypatch.setattr(run, name, lambda *given: asked.append(given[-1]))
+    monkeypatch.setattr(
+        "microrad.campaign.optimisation.campaign.optimise_campaign",
+        lambda file, threads, progress: asked.append(progress) or found,
+    )
+    monkeypatch.setattr("microrad.report.campaign.optimum.optimum_text", lambda found: "shown")
+    assert call("campaign", command, file) == (0, "shown\n", "")
+    assert asked == [30.0, "progress"]
+
+
+@pytest.mark.parametrize(("command", "begins"), [("report", "<!DOCTYPE html>"), ("export", "cell,")])
+def test_a_disk_that_takes_no_page_and_no_rows_is_told_with_the_file(call, folder, monkeypatch, command, begins):
+    """What is there stays as it is."""
+
+    @contextmanager
+    def opened(path, write):
+        yield "book"
+
+    def full(*given):
+        raise OSError(28, "No space left on device", "x.csv")
+
+    monkeypatch.setattr(Ledger, "open", opened)
+    monkeypatch.setattr("microrad.campaign.statistics.summary.summarise_campaign", lambda path: "found")
+    monkeypatch.setattr("microrad.report.campaign.page.campaign_page", lambda found: "<!DOCTYPE html>new")
+    monkeypatch.setattr("microrad.campaign.export.export_rows", full)
+    monkeypatch.setattr(cli_campaign, "write_whole", full)
+    (folder / "x.csv").write_text(f"{begins}old", "utf-8")
+    shown = call("campaign", command, "rows.ledger", "x.csv", "--overwrite")
+    words = "x.csv: No space left on device; nothing was written there. Check free space and permissions."
+    assert (shown.code, shown.out, shown.err) == (2, "", f"microrad: {words}\n")
+    assert (folder / "x.csv").read_text("utf-8") == f"{begins}old"

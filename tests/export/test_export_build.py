@@ -1,9 +1,11 @@
 """Compiling exported code and running its bench: results, and what is said where it fails."""
 
+import math
 import os
 import re
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -282,3 +284,56 @@ def test_a_failure_shows_the_first_lines_and_how_many_there_are_more(lines: int,
 )
 def test_an_ending_is_told_by_its_status_or_its_signal(code: int, words: str) -> None:
     assert build._ending(code) == words
+
+
+def test_a_program_runs_in_its_folder_without_input_in_plain_words_and_as_no_part_of_another_make(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for key in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL", "LC_ALL", "OTHER_FLAGS"):
+        monkeypatch.setenv(key, "odd")
+    script = (
+        "import os, sys\n"
+        "print(sorted(k for k, v in os.environ.items() if v == 'odd'), os.environ['LC_ALL'], repr(sys.stdin.read()))\n"
+        "print(os.path.basename(os.getcwd()), sys.argv[1:], flush=True)\n"
+        "os.write(2, b'an error of \\xff\\n')\n"
+        "sys.exit(3)\n"
+    )
+    (tmp_path / "deep").mkdir()
+    code, text = build.run((sys.executable, "-c", script, "a b", "c"), tmp_path / "deep")
+    assert code == 3
+    assert text.splitlines() == ["['OTHER_FLAGS'] C ''", "deep ['a b', 'c']", "an error of \ufffd"]
+
+
+def test_numbers_of_a_bench_are_the_lines_of_one_word_and_one_number() -> None:
+    text = "samples 3\nbound_v 1e-3 V\n  peak_command_v\t-2.5  \nmedian fast\nlonely\n\nsamples 4\nfound nan\n7 8\n"
+    found = build._numbers(text)
+    assert math.isnan(found.pop("found"))
+    assert found == {"samples": 4.0, "peak_command_v": -2.5, "7": 8.0}
+
+
+@pytest.mark.parametrize(
+    ("asked", "there", "words"),
+    [
+        ("gcc -m32", {"gcc"}, ("gcc", "-m32")),
+        ("/my tools/cc", {"/my tools/cc", "/my"}, ("/my tools/cc",)),
+        ("'/my tools/cc' -O0 \"-D A\"", {"/my tools/cc"}, ("/my tools/cc", "-O0", "-D A")),
+        ("  clang  ", {"clang"}, ("clang",)),
+        ("cc 'open", set(), 'the environment variable CC is "cc \'open": no closing quotation'),
+        (
+            "gone -m32",
+            {"cc"},
+            "the environment variable CC is 'gone -m32', and there is no such program on the path: set",
+        ),
+    ],
+)
+def test_the_words_of_the_compiler_are_those_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch, asked: str, there: set[str], words: tuple[str, ...] | str
+) -> None:
+    monkeypatch.setenv("CC", asked)
+    monkeypatch.setattr(build.shutil, "which", lambda name: name if name in there else None)
+    if isinstance(words, tuple):
+        assert (build.compiler(), build.compiler_words()) == (asked.strip(), words)
+        return
+    with pytest.raises(ExportError) as told:
+        build.compiler_words()
+    assert str(told.value).startswith(words)

@@ -148,3 +148,30 @@ edge: { sourcename: "y.c:last" targetname: "log" label: "y.c:9:4" }
     assert stack.deepest(GRAPH, "x.c:deeper").words == "30 bytes at most, from this machine's compiler"
     bounded = GRAPH.replace("9000 bytes (static)", "9000 bytes (dynamic,bounded)")
     assert stack.deepest(bounded, "step") is None, "not even where the step does not call it"
+
+
+@pytest.mark.parametrize(("code", "graphs", "most"), [(0, 2, 112), (0, 1, None), (0, 0, None), (1, 2, None)])
+def test_the_stack_is_told_where_the_compiler_succeeds_and_has_written_the_graphs(
+    tmp_path, monkeypatch, code, graphs, most
+):
+    """The step is in the second file and what it calls in the first one; beside the sources nothing is written."""
+    asked = []
+    node = 'node: {{ title: "{}" label: "{}\\nx.c\\n{} bytes (static)" }}\n'
+    texts = [
+        node.format("other", "other", 900) + node.format("tip_part", "tip_part", 32),
+        node.format("tip_step", "tip_step", 80) + 'edge: { sourcename: "tip_step" targetname: "tip_part" }\n',
+    ]
+
+    def run(command, folder):
+        asked.append(command)
+        for number, text in enumerate(texts[:graphs]):
+            (folder / f"g{number}.ci").write_text(text, encoding="utf-8")
+        return code, ""
+
+    monkeypatch.setattr(stack, "compiler_words", lambda: ("mycc", "-m64"))
+    monkeypatch.setattr(stack, "run", run)
+    found = stack.stack_use(tmp_path, ["b.c", "a.c"], "tip_step")
+    assert (None if found is None else found.most_bytes) == most
+    paths = [str((tmp_path / name).resolve()) for name in ("b.c", "a.c")]
+    assert asked == [("mycc", "-m64", *stack.FLAGS, "-fcallgraph-info=su", "-c", *paths)]
+    assert list(tmp_path.iterdir()) == []
