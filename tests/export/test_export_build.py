@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -298,10 +299,19 @@ def test_a_program_runs_in_its_folder_without_input_in_plain_words_and_as_no_par
         "os.write(2, b'an error of \\xff\\n')\n"
         "sys.exit(3)\n"
     )
+    asked: dict[str, object] = {}
+
+    class Popen(subprocess.Popen[str]):
+        def __init__(self, command: tuple[str, ...], **more: Any) -> None:
+            asked.update(more)
+            super().__init__(command, **more)
+
+    monkeypatch.setattr(subprocess, "Popen", Popen)
     (tmp_path / "deep").mkdir()
     code, text = build.run((sys.executable, "-c", script, "a b", "c"), tmp_path / "deep")
     assert code == 3
     assert text.splitlines() == ["['OTHER_FLAGS'] C ''", "deep ['a b', 'c']", "an error of \ufffd"]
+    assert (asked["stdin"], asked["start_new_session"]) == (subprocess.DEVNULL, True)
 
 
 def test_numbers_of_a_bench_are_the_lines_of_one_word_and_one_number() -> None:
