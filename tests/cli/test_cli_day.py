@@ -452,3 +452,48 @@ def test_a_plan_is_of_the_loss_of_the_links_and_has_the_name_of_its_mission(call
     links, (file, loss, told) = asked
     assert data == {"mission": file.mission.name, "same": True}
     assert (file, loss, told) == (links.file, 2.75, True)
+
+
+@pytest.mark.parametrize("form", [(), ("--json",), ("--csv",), ("--html",)])
+def test_each_form_of_a_day_is_of_that_day_and_has_the_sources_of_its_mission(call, folder, monkeypatch, form):
+    asked = []
+    day = SimpleNamespace(relay=SimpleNamespace(capacity_bit=1.0))
+    sources = {"orbit.epoch": "a source"}
+    links = SimpleNamespace(file=SimpleNamespace(mission=SimpleNamespace(name="a mission"), sources=sources))
+    monkeypatch.setenv("COLUMNS", "98")
+    monkeypatch.setattr("microrad.mission.file.load_link", lambda file: asked.append(str(file)) or "given")
+    monkeypatch.setattr(link_study, "run_link_study", lambda given: asked.append(given) or links)
+    monkeypatch.setattr(
+        day_study, "run_day_study", lambda links, on_progress: asked.append((links, callable(on_progress))) or day
+    )
+    monkeypatch.setattr("microrad.report.marks.with_marks", lambda data, of: {**data, "marks": of})
+    monkeypatch.setattr("microrad.report.day.data.day_data", lambda found: {"same": found is day})
+    monkeypatch.setattr("microrad.report.day.data.day_csv", lambda found: f"csv {found is day}")
+    monkeypatch.setattr("microrad.report.day.page.day_page", lambda found, of: f"<!page {found is day} {of is links}>")
+    monkeypatch.setattr("microrad.report.day.page.day_text", lambda found, width, of: f"{found is day} {width} {of}")
+    result = call("contacts", "a/day.toml", *form)
+    assert (result.code, result.err, asked) == (0, "", ["a/day.toml", "given", (links, True)])
+    if form == ("--json",):
+        assert json.loads(result.out) == {"mission": "a mission", "same": True, "marks": sources}
+        return
+    out = {"--csv": "csv True", "--html": "<!page True True>"}
+    assert result.out == f"{out[form[0]] if form else f'True 98 {sources}'}\n"
+
+
+@pytest.mark.parametrize(
+    ("form", "out"), [((), "True 98"), (("--csv",), "csv of planned at 2026"), (("--contact-plan",), "plan")]
+)
+def test_each_form_of_a_plan_is_of_that_plan(call, folder, monkeypatch, form, out):
+    plan = SimpleNamespace(
+        volume_bit=1.0, planned="planned", epoch=SimpleNamespace(utc="2026"), contact_plan=lambda: "plan"
+    )
+    monkeypatch.setenv("COLUMNS", "98")
+    monkeypatch.setattr("microrad.mission.file.load_link", lambda file: "given")
+    monkeypatch.setattr(link_study, "run_link_study", lambda given: SimpleNamespace(file=given))
+    monkeypatch.setattr(day_study, "given_loss", lambda links: f"loss of {links.file}")
+    monkeypatch.setattr(
+        plans, "run_constellation", lambda file, loss, progress: plan if loss == f"loss of {file}" else None
+    )
+    monkeypatch.setattr("microrad.orbit.operations.csv_text", lambda planned, utc: f"csv of {planned} at {utc}")
+    monkeypatch.setattr("microrad.report.day.constellation.plan_text", lambda found, width: f"{found is plan} {width}")
+    assert call("constellation", "a/day.toml", *form) == (0, f"{out}\n", "")
