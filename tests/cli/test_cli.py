@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -2603,3 +2603,18 @@ def test_a_lever_arm_of_nothing_is_one_that_was_given(refused, folder, monkeypat
     monkeypatch.setattr(lab, "unit_of", lambda *given: ("V", "given"))
     monkeypatch.setattr(lab, "identify_channels", lambda *given: pytest.fail("it ran"))
     assert refused("identify", "a.csv", *options).startswith("microrad: --lever-arm is for one drive and one output")
+
+
+@pytest.mark.parametrize(
+    ("key", "names"),
+    [
+        ("kind", ["orbit.leo.kind", "orbit.geo.kind"]),
+        ("duration", ["orbit.duration", "fine_pointing.duration"]),
+    ],
+)
+def test_each_of_several_keys_of_one_end_is_explained_in_the_data(call, key, names):
+    from microrad.mission.explain import explained
+
+    data = json.loads(call("explain", "--json", key).out)
+    assert [each["name"] for each in data] == names
+    assert data == json.loads(json.dumps([asdict(each) for each in explained(key)]))
