@@ -1783,6 +1783,8 @@ def test_a_drawn_switch_is_told_as_the_file_has_it(tmp_path):
     assert told.mission.point_ahead.corrected is False
     source = told.sources["point_ahead.corrected"]
     assert (source.value, source.comment) == ("false", "campaign: drawn, false")
+
+
 def test_a_mission_that_the_middle_of_all_draws_leaves_not_is_told_of_its_cell_and_of_the_key_to_blame(tmp_path):
     """The first cell that has none is told, whichever it is, and of two drawn keys the one that the fault names."""
     bias = distributed("mirror.bias", 'distribution = "uniform"\nlow = "10.5 V"\nhigh = "11.5 V"')
