@@ -3,6 +3,7 @@
 import asyncio
 import io
 import json
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -2491,3 +2492,150 @@ def test_a_recording_that_can_no_longer_be_read_says_why_in_place_of_its_samples
 def test_the_figures_of_an_identification_stand_under_their_own_names(job_view):
     labels = [each.props["aria-label"] for each in (job_view.loop, job_view.residual)]
     assert labels == ["Measured loop and that of the model", "Residual over time"]
+
+
+# ------------------------------------------------------------------------------------------- what is rarely the case
+@pytest.mark.parametrize("preset", ["tbird", None])
+def test_a_mission_that_comes_with_microrad_is_chosen_on_every_page_that_compares_with_it(session, compared, preset):
+    option = compare._SHIPPED if preset is None else compare._PRESET + preset
+    compared.choice.value = option
+    assert session.other.text == (Draft.shipped("").text if preset is None else preset_text(preset))
+    assert compared._compared(compared._options()) == option
+    assert compared._name(session.other) == option
+    another = compare._Page(session)
+    assert (another.choice.value, another.shown) == (option, option)
+
+
+def test_another_mission_that_cannot_be_kept_on_disk_is_not_compared_with_and_says_why(session, compared, monkeypatch):
+    def full(draft, name):
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(session, "_keep", full)
+    compared._chosen(SimpleNamespace(value=compare._SHIPPED))
+    assert (compared.fault.text, session.other) == ("the disk is full", None)
+
+
+@pytest.mark.parametrize(("rate_hz", "half"), [(1000.0, "500 Hz"), (30000.0, "")])
+def test_a_sine_is_refused_by_the_rate_of_the_controller_that_is_shown(session, controls, monkeypatch, rate_hz, half):
+    """The sine of 2.5 kHz is half of what the other controllers sample with."""
+    monkeypatch.setattr(control, "_controller", lambda file, name: controller(name, rate_hz=rate_hz))
+    asyncio.run(controls.reload())
+    controls.filling = True
+    controls.frequency.value = "2.5 kHz"
+    controls.filling = False
+    asyncio.run(controls.show())
+    assert (f"2.5 kHz is not below {half}, half the rate" in controls.fault.text) is bool(half)
+    assert bool(controls.fault.text) is bool(half)
+
+
+@pytest.mark.parametrize("how", ["in its place", "beside it"])
+def test_a_file_that_the_mission_names_is_another_although_its_size_or_its_time_is_the_same(naming, how):
+    """In place: of the same size, at another time. Another file in its stead: of the same size and time."""
+    path = naming.folder / "shake.csv"
+    before, key, revision = path.stat(), naming.key, naming.revision
+    text = path.read_text("utf-8").replace("0.1, 100", "0.1, 900")
+    if how == "in its place":
+        path.write_text(text, "utf-8")
+        os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns + 1000))
+    else:
+        new = path.with_name("new.csv")
+        new.write_text(text, "utf-8")
+        os.utime(new, ns=(before.st_atime_ns, before.st_mtime_ns))
+        new.replace(path)
+    assert path.stat().st_size == before.st_size
+    assert naming.key != key and naming.disk == "" and naming.revision == revision + 1
+
+
+def test_a_loop_that_cannot_be_simulated_says_why_and_is_not_waited_for(session, controls, monkeypatch):
+    def ask(ask, variants):
+        raise ValueError("the loop is not stable")
+
+    monkeypatch.setattr(control, "_controller", lambda file, name: controller(name, ask=ask))
+    asyncio.run(controls.reload())
+    assert (controls.fault.text, controls.state.text) == ("the loop is not stable", "")
+    assert behind(controls) == set(controls.plots) - {"sensitivity", "gain"}
+    assert controls.drawn == ["PI"]
+
+
+def test_of_all_controllers_the_one_that_is_tuned_anew_keeps_its_row_meanwhile(session, controls, monkeypatch):
+    asyncio.run(controls.reload())
+    rows = []
+
+    async def looked(element, work, *args):
+        rows.append([each if isinstance(each, str) else each.name for each in controls.found.values()])
+        return work(*args)
+
+    monkeypatch.setattr(control, "in_thread", looked)
+    asyncio.run(controls.tune_all())
+    new, now = "not looked at yet", "being tuned ..."
+    assert rows == [
+        [now, "PI", new, new],
+        ["baseline", "PI", new, new],
+        ["baseline", "PI", now, new],
+        ["baseline", "PI", "PID", now],
+    ]
+
+
+def test_tuning_that_was_stopped_does_not_end_the_one_that_was_begun_after_it(session, controls, monkeypatch):
+    gates = []
+
+    async def slow(element, work, *args):
+        gates.append(asyncio.Event())
+        await gates[-1].wait()
+        return work(*args)
+
+    async def twice():
+        first = asyncio.create_task(controls.tune_all())
+        await asyncio.sleep(0)
+        controls.stop_all()
+        second = asyncio.create_task(controls.tune_all())
+        await asyncio.sleep(0)
+        gates[0].set()
+        await first
+        seen = [(controls.tune.visible, controls.stop.visible, [*controls.made])]
+        while not second.done():
+            for gate in gates:
+                gate.set()
+            await asyncio.sleep(0)
+        return [*seen, (controls.tune.visible, controls.stop.visible, [*controls.made])]
+
+    asyncio.run(controls.reload())
+    controls.made.clear()
+    monkeypatch.setattr(control, "in_thread", slow)
+    all_four = ["baseline", "PI", "PID", "inverse"]
+    assert asyncio.run(twice()) == [(False, True, ["baseline"]), (True, False, ["baseline", *all_four])]
+
+
+@pytest.mark.parametrize(("margin", "dashed"), [("4.5 dB", " Dashed line: 0 dB."), ("0 dB", "")])
+def test_margins_map_and_words_of_the_links_are_those_of_what_is_seen(session, links, monkeypatch, margin, dashed):
+    shows = []
+
+    async def draw(plot):
+        shows.append(("map", plot))
+
+    session.set("requirement.margin", margin)
+    view = links._view(session.link())
+    monkeypatch.setattr(links.cards, "show", lambda margins: shows.append(("cards", margins)))
+    monkeypatch.setattr(links.map, "draw", draw)
+    monkeypatch.setattr(link_view, "map_plot", id)
+    asyncio.run(links.show(view))
+    assert shows == [("cards", view.margins), ("map", id(view))]
+    assert [each.name for each in view.margins] == ["Communication", "Beacon", "Answer"]
+    links.view_now = view
+    links.show_rest(view)
+    assert links.key.text == f"Solid line: the required {margin}.{dashed} Dot: the working point."
+    assert links.words.text == link_view.map_words(view) and f"for the required {margin}." in links.words.text
+    assert links.which.options == ["Communication", "Beacon", "Answer"]
+
+
+def test_the_map_keeps_its_axes_while_the_mission_lies_within_them(session, links):
+    rate = "communication.data_rate"
+    links.view_now = links._view(session.link())
+    frame = links.view_now.frame
+    low, high = (float(frame.data_rate_bit_s[k]) for k in (0, -1))
+    session.set(rate, f"{1.5 * low / 1e6:g} Mbit/s")
+    links.view_now = links._view(session.link())
+    assert links.view_now.frame is frame
+    session.set(rate, f"{0.5 * low / 1e6:g} Mbit/s")
+    links.view_now = links._view(session.link())
+    assert links.view_now.frame.data_rate_bit_s[0] < low < high
