@@ -2639,3 +2639,80 @@ def test_the_map_keeps_its_axes_while_the_mission_lies_within_them(session, link
     session.set(rate, f"{0.5 * low / 1e6:g} Mbit/s")
     links.view_now = links._view(session.link())
     assert links.view_now.frame.data_rate_bit_s[0] < low < high
+
+
+def test_what_follows_from_the_links_is_shown_with_its_own_figures(session, links, monkeypatch):
+    pictures = tuple(Drawing(name, f"title {name}", "", "<svg/>") for name in "ab")
+    monkeypatch.setattr(link, "_told", lambda result: (pictures, {"a": f"data:a{result}", "b": f"data:b{result}"}))
+    for key, result in (("one", 1), ("two", 2)):
+        links.study.state = State(key, result=result)
+        asyncio.run(links._look())
+        found = [each.props["src"] for each in links.told.descendants() if "src" in each.props]
+        assert (links.shown, found) == (key, [f"data:a{result}", f"data:b{result}"])
+
+
+def test_an_identification_that_is_begun_is_the_one_that_is_shown(bench, monkeypatch):
+    followed, orders = [], []
+
+    async def follow(number):
+        followed.append(number)
+
+    def submit(order):
+        orders.append(order)
+        if len(orders) == 2:
+            raise JobError("the queue is held by another program")
+        return SimpleNamespace(number=17)
+
+    action = commands.identify([Path("a.csv")], "0", "1", Path("m.toml"), name="m")
+    monkeypatch.setattr(bench, "action", lambda: action)
+    monkeypatch.setattr(bench.session.jobs, "submit", submit)
+    monkeypatch.setattr(bench.job, "follow", follow)
+    asyncio.run(bench.start())
+    assert (followed, bench.words.text) == ([17], "")
+    asyncio.run(bench.start())
+    assert (followed, bench.words.text) == ([17], "the queue is held by another program")
+    assert orders == [mirror_form.order(bench.session.folder, action)] * 2
+
+
+def test_why_a_recording_cannot_be_measured_is_told_in_the_words_of_the_form(bench, monkeypatch):
+    """Those of the reader name the options of the command."""
+
+    def refuse(path, columns):
+        words = "give the rate (--rate, rate_hz) in Hz, or name the time column (time)"
+        raise mirror.reading.ReadingError(f"{path.name}: {words}.")
+
+    put_in(bench, "a.csv", "b.csv")
+    monkeypatch.setattr(mirror.reading, "view", refuse)
+    asyncio.run(bench.take(bench.files["a"]))
+    asyncio.run(bench.check())
+    asyncio.run(bench.look())
+    assert bench.words.text == "a.csv: type the sample rate."
+    assert [text for text in texts(bench.list) if ":" in text] == [f"{n}.csv: type the sample rate." for n in "ab"]
+
+
+def test_the_name_of_the_recording_that_is_shown_stands_out_in_the_list(bench):
+    def outstanding():
+        return [each.text for each in bench.list.descendants() if "seen" in getattr(each, "classes", ())]
+
+    put_in(bench, "a.csv", "b.csv", "c.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    for _ in range(3):
+        asyncio.run(bench.check())
+    asyncio.run(bench.look())
+    assert outstanding() == ["a.csv"]
+    for key in "bca":
+        asyncio.run(bench.see(key))
+        assert outstanding() == [f"{key}.csv"]
+
+
+def test_each_recording_keeps_its_own_use_and_others_are_fitted(bench):
+    put_in(bench, "a.csv", "b.csv", "c.csv")
+    bench.use("b", "leave")
+    bench.use("c", "check")
+    assert [(each.name, each.use) for each in bench.dropped()] == [
+        ("a.csv", "fit"),
+        ("b.csv", "leave"),
+        ("c.csv", "check"),
+    ]
+    bench.use("b", "fit")
+    assert mirror_form.kept_form(bench.path).uses == {"b": "fit", "c": "check"}

@@ -1300,3 +1300,119 @@ def test_each_device_of_windows_is_no_name(name):
     assert str(refusal.value) == words
     assert typed_words(refusal.value) == words.replace("rename it and drop it again", "choose another name")
     assert safe_name(f"a{name}") == f"a{name}"
+
+
+# ------------------------------------------------------------------------------------------------- just at the limits
+def test_of_many_rates_that_a_file_states_the_first_fifty_are_told(monkeypatch):
+    source = SimpleNamespace(
+        names=[f"c{k}" for k in range(60)],
+        units=["V"] * 60,
+        samples=lambda: [3] * 60,
+        rates=lambda which: [SimpleNamespace(rate_hz=100.0 - k) for k in which],
+    )
+    monkeypatch.setattr(process, "opened", lambda path, request: source)
+    found = process.channels(Path("a"), {"limits": {"channels": 55}})
+    assert found["rates_hz"] == [100.0 - k for k in range(50)]
+    assert len(found["channels"]) == 55
+
+
+@pytest.mark.parametrize("task", ["channels", "view"])
+def test_whatever_is_asked_of_a_recording_it_may_not_state_more_samples_than_are_read(tmp_path, task):
+    np.save(tmp_path / "a.npy", np.random.default_rng(1).normal(size=(300, 2)))
+    columns = {"inputs": [0], "outputs": [1], "rate_hz": 1e3, "accept": []}
+    limits = {"samples": 299, "channels": 5, "points": 10, "memory_bytes": 1}
+    request = {"task": task, "name": "a.npy", "folder": str(tmp_path), "columns": columns, "limits": limits}
+    here = Path.cwd()
+    try:
+        refusal = process.answer_to(request)["refused"]
+    finally:
+        os.chdir(here)
+    assert refusal.startswith("a.npy: 'data[0]' states 300 samples, and at most 299 are read here; cut out")
+
+
+def test_what_a_library_prints_is_no_part_of_the_answer():
+    program = (
+        "import os, sys; from microrad.studio.recordings import process\n"
+        "process.limit = lambda limits: print('one', flush=True)\n"
+        "process.answer_to = lambda request: {'said': [os.write(1, b'two'), os.write(2, b'three'), request['a']]}\n"
+        "process.main()"
+    )
+    request = json.dumps({"limits": {}, "a": "\u00b5"}).encode()
+    done = subprocess.run([sys.executable, "-c", program], input=request, capture_output=True, check=True)
+    assert (done.stdout, done.stderr) == (b'{"said": [3, 5, "\\u00b5"]}', b"")
+
+
+@pytest.mark.parametrize("more", [0, 1])
+@posix
+def test_an_answer_of_just_as_many_bytes_as_are_taken_is_taken(tmp_path, monkeypatch, more):
+    said = "x" * (123_456 + more)
+    program = f"import os, sys; sys.stdin.read(); print({said!r}, end='', flush=True); os.close(1); raise SystemExit(3)"
+    path = standing_in(monkeypatch, tmp_path, program)
+    limits = ReadingLimits(answer_bytes=123_456)
+    if not more:
+        assert reading._run(b"{}", limits, path.name) == (said.encode(), 3)
+        return
+    with pytest.raises(ReadingError) as refusal:
+        reading._run(b"{}", limits, path.name)
+    advice = "cut out the part of the recording that you need, or keep every n-th sample"
+    assert str(refusal.value) == f"'x.csv' has more to say than 0.123456 MB; {advice}."
+
+
+def test_names_too_long_for_a_request_are_refused_with_the_name_of_the_file(tmp_path):
+    with pytest.raises(ReadingError) as refusal:
+        view(tmp_path / "a b.csv", Columns(("x" * 40_000,), (2,)))
+    assert str(refusal.value) == "a b.csv: the names of the channels are too long; give their numbers instead."
+
+
+def test_a_folder_whose_name_is_longer_than_a_key_is_the_place_of_no_recording(tmp_path):
+    uploads = Uploads(tmp_path, replace(LIMITS, files=1, total_bytes=10))
+    for name in ("0123456789abcdef-copy", "x0123456789abcdef", "0123456789ABCDEF"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "old.csv").write_bytes(bytes(9))
+    assert (uploads.listed(), save(uploads, "new.csv", bytes(10)).size) == ((), 10)
+
+
+def test_bytes_of_files_on_their_way_count_for_what_all_may_have(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording_uploads, "_BLOCK_BYTES", 1)
+    uploads = Uploads(tmp_path, LIMITS)
+
+    async def three():
+        gate, begun = asyncio.Event(), [asyncio.Event(), asyncio.Event()]
+
+        async def slow(size, event):
+            yield bytes(size)
+            event.set()
+            await gate.wait()
+
+        coming = [asyncio.create_task(uploads.save(f"{k}.csv", slow(900, begun[k]))) for k in range(2)]
+        for event in begun:
+            await event.wait()
+        with pytest.raises(UploadError, match=r"'third.csv' is not taken: all recordings together may have 0.0025 MB"):
+            await uploads.save("third.csv", blocks(bytes(701)))
+        third = await uploads.save("third.csv", blocks(bytes(700)))
+        gate.set()
+        return [third.size, *[(await each).size for each in coming]]
+
+    assert asyncio.run(three()) == [700, 900, 900]
+
+
+@posix
+def test_of_old_links_in_the_spool_none_stays_and_what_they_lead_to_does(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    uploads = Uploads(tmp_path / "uploads", LIMITS)
+    spool, kept = uploads.folder / "spool", tmp_path / "kept"
+    spool.mkdir()
+    kept.mkdir()
+    (kept / "a.csv").write_bytes(b"1")
+    for name, target in (("folder", kept), ("file", kept / "a.csv"), ("nothing", tmp_path / "none")):
+        (spool / name).symlink_to(target)
+        os.utime(spool / name, (1.0, 2.0), follow_symlinks=False)
+    uploads.hold_temporary_files()
+    assert (everything(spool), everything(kept)) == ([], ["a.csv"])
+
+
+def test_a_recording_that_another_tab_removes_as_it_is_looked_at_has_no_size(tmp_path):
+    assert recording_uploads._status(tmp_path / "gone.csv") == (0, 0)
+    (tmp_path / "there.csv").write_bytes(b"123")
+    os.utime(tmp_path / "there.csv", ns=(1, 2_000_000_500))
+    assert recording_uploads._status(tmp_path / "there.csv") == (3, 2_000_000_500)
