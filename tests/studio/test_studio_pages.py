@@ -2716,3 +2716,261 @@ def test_each_recording_keeps_its_own_use_and_others_are_fitted(bench):
     ]
     bench.use("b", "fit")
     assert mirror_form.kept_form(bench.path).uses == {"b": "fit", "c": "check"}
+
+
+def test_a_mirror_gets_its_name_from_the_recording_that_is_shown_first(bench):
+    put_in(bench, "stage.csv")
+    asyncio.run(bench.look())
+    assert (bench.form.seen, bench.form.setting.name, bench.fields["name"].value) == (
+        "s",
+        "stage-mirror",
+        "stage-mirror",
+    )
+
+
+def test_the_identification_that_was_chosen_tells_its_own_end_and_is_cancelled(session, job_view, monkeypatch):
+    view, asked, cancelled, scored = job_view, [], [], []
+    monkeypatch.setattr(session.jobs, "output", lambda number: f"said by {number}")
+    monkeypatch.setattr(session.jobs, "cancel", cancelled.append)
+    monkeypatch.setattr(mirror_job.mirror_view, "outcome", lambda text: asked.append(text) or ("a", (Soft(text),)))
+    monkeypatch.setattr(
+        mirror_job.mirror_view,
+        "score_rows",
+        lambda fits, chosen: scored.append((len(fits), chosen)) or [("m", "1 %", "2 %", chosen)],
+    )
+    view.jobs = [
+        identified(session.folder, 3, "failed"),
+        identified(session.folder, 2, "done"),
+        identified(session.folder, 1, "cancelled"),
+    ]
+    view.read = {"3": fits("c"), "2": fits("a", "b", loops=2), "1": fits("d", "e", "f")}
+    for number in (3, 2, 1):
+        asyncio.run(view.choose(SimpleNamespace(value=number)))
+        view.stop()
+        if number == 2:
+            assert texts(view.told) == ["said by 2"]
+            assert [row["c3"] for row in view.table.rows] == ["a"]
+    assert (asked, cancelled, scored) == (["said by 2"], [3, 2, 1], [(1, ""), (2, "a"), (3, "")])
+    assert (texts(view.told), view.words.text) == ([], "cancelled f")
+
+
+def test_the_recording_that_was_chosen_stays_while_more_models_come(session, job_view):
+    view = job_view
+    view.jobs, view.read = [identified(session.folder, 1)], {"1": fits("a", loops=3)}
+    asyncio.run(view.look())
+    view.recording.value = 2
+    view.draw()
+    first = view.read["1"]
+    view.read = {"1": (*first, *fits("better", loops=3))}
+    view.read["1"][1].held_out_rms_percent = 1.0
+    asyncio.run(view.look())
+    assert (view.recording.value, view.drawn_fits) == (2, [("a", 0, "mV"), ("a", 2, "mV"), ("better", 2, "mV")])
+
+
+def test_both_plots_of_pointing_are_drawn_each_in_its_own_place(session, tab, monkeypatch):
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    shows, page = [], pointing.PointingPage(session)
+    for name in ("coverage_plot", "lines_plot"):
+        monkeypatch.setattr(pointing.pointing_view, name, lambda view, name=name: (name, view))
+
+    def drawing(place):
+        async def draw(plot):
+            shows.append((place, *plot))
+
+        return draw
+
+    for place in ("coverage", "bars"):
+        monkeypatch.setattr(getattr(page, place), "draw", drawing(place))
+    asyncio.run(page.show("the view"))
+    assert shows == [("coverage", "coverage_plot", "the view"), ("bars", "lines_plot", "the view")]
+
+
+def test_a_budget_of_errors_is_shown_with_its_figures_and_not_in_grey(session, tab, monkeypatch):
+    monkeypatch.setattr(layout, "follow", lambda session, show: lambda: None)
+    page, view = pointing.PointingPage(session), SimpleNamespace(file=None)
+    drawing = Drawing("errors", "Errors", "caption", "<svg/>")
+    monkeypatch.setattr(pointing, "_budget", lambda file, table: View("", [drawing]))
+    monkeypatch.setattr(pointing, "drawn", lambda blocks: {each.name: "data:errors" for each in blocks})
+    layout.grey(page.budget, True)
+    page.view_now = None
+    asyncio.run(page._errors(view, "table"))
+    assert "behind" in page.budget.classes
+    page.view_now = view
+    asyncio.run(page._errors(view, "table"))
+    assert [each.props["src"] for each in page.budget.descendants() if "src" in each.props] == ["data:errors"]
+    assert "behind" not in page.budget.classes
+
+
+def test_a_ledger_is_named_like_its_campaign_file_up_to_the_last_dot_and_anew_after_each_run(session, tab, monkeypatch):
+    (session.folder / "day.v1.toml").write_text('mission = "leo-geo.toml"', "utf-8")
+    campaign, ran = runs._Campaign(session), []
+
+    def submit(order):
+        ran.append(order.arguments[-1])
+        (session.folder / order.results[0]).touch()
+
+    monkeypatch.setattr(session.jobs, "submit", submit)
+    asyncio.run(campaign._look())
+    assert campaign.ledger.value == "day.v1.ledger"
+    for name in ("day.v1.ledger", "day.v1-2.ledger"):
+        asyncio.run(campaign._run())
+        assert ran[-1] == name
+    assert campaign.ledger.value == "day.v1-3.ledger"
+    asyncio.run(campaign._look())
+    campaign.file.value = "day.v1-2.ledger (go on)"
+    asyncio.run(campaign._name())
+    assert (campaign.ledger.value, campaign.ledger.enabled) == ("day.v1-2.ledger", False)
+
+
+def test_an_example_that_the_disk_does_not_take_says_why(session, tab, monkeypatch):
+    def full(session):
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(runs, "write_campaign", full)
+    campaign = runs._Campaign(session)
+    asyncio.run(campaign._example())
+    assert (campaign.fault.text, campaign.file.value) == ("the disk is full", None)
+
+
+def test_a_study_of_a_mission_that_is_not_saved_is_copied_with_a_warning(session, tab, monkeypatch):
+    copied, notes = [], []
+    monkeypatch.setattr(layout, "_copy", lambda action, python: copied.append(action))
+    monkeypatch.setattr(layout.ui, "notify", lambda words, **settings: notes.append((words, settings["type"])))
+    study = runs._Study(session)
+    study.folder.value = "out"
+    action = commands.study(Path("leo-geo.toml"), Path("out"))
+    press(buttons(tab.content)["Copy as command"])
+    assert (copied, notes) == ([action], [])
+    session.set(LEO, "6 cm")
+    press(buttons(tab.content)["Copy as Python"])
+    words = "The command reads the file: save the mission first, for the same numbers."
+    assert (copied, notes) == ([action, action], [(words, "warning")])
+
+
+def test_how_long_a_job_runs_is_told_at_each_look_although_nothing_else_is_new(session, cards, monkeypatch):
+    job = Job(2, session.folder, "running", "study", "mine", progress=Progress(1, 3, "rows"))
+    card = runs_jobs._Card(cards, job)
+    for words in ("for 1 s", "for 2 s"):
+        monkeypatch.setattr(runs_jobs, "time_words", lambda job, words=words: words)
+        shown(card, job)
+        assert (card.when.text, card.bar.value) == (words, 0.3333)
+
+
+def test_a_panel_looks_at_its_ledger_while_it_is_open_alone(session, tab):
+    panel = runs_jobs.CampaignPanel(session, session.folder / "x.ledger")
+    seen = [(panel.place.visible, panel._timer.active)]
+    for panel.open in (True, False, True):
+        seen.append((panel.place.visible, panel._timer.active))
+    assert seen == [(False, False), (True, True), (False, False), (True, True)]
+
+
+def test_a_panel_tells_the_fault_that_its_ledger_has_now(session, tab, monkeypatch):
+    panel = runs_jobs.CampaignPanel(session, session.folder / "x.ledger")
+    looked = []
+    monkeypatch.setattr(runs_jobs, "figures", lambda live: found_figures(live.fault or "none"))
+    for fault in ("row 3 is damaged", "row 5 is damaged", ""):
+        monkeypatch.setattr(
+            session.campaigns, "look", lambda path, fault=fault: looked.append(path) or SimpleNamespace(fault=fault)
+        )
+        asyncio.run(panel._look())
+        assert (panel._fault.text, panel._fault.visible) == (fault, bool(fault))
+        assert [*panel._chosen.options] == [fault or "none"]
+    assert looked == [session.folder / "x.ledger"] * 3
+
+
+def test_of_two_jobs_of_one_ledger_the_newer_goes_on_and_has_the_report(session, cards, monkeypatch):
+    (session.folder / "x.ledger").touch()
+    (session.folder / "sub").mkdir()
+    (session.folder / "sub" / "x.html").touch()
+
+    def job(number, state, kind, arguments, *results):
+        return Job(number, session.folder, state, kind, "t", arguments, session.folder, results)
+
+    begun = job(1, "cancelled", "campaign", ("campaign", "run", "c.toml", "--ledger", "x.ledger"), "x.ledger")
+    resumed = job(2, "done", "campaign", ("campaign", "resume", "x.ledger"), "x.ledger")
+    report = job(3, "done", "export", ("campaign", "report", "x.ledger", "sub/x.html", "--overwrite"), "sub/x.html")
+    for jobs in ((begun,), (resumed, begun), (report, resumed, begun)):
+        monkeypatch.setattr(session.jobs, "listed", lambda jobs=jobs: jobs)
+        asyncio.run(cards.refresh())
+        first = cards._cards[1]
+        assert (first.again.visible, first.results.visible, texts(first.report)) == (len(jobs) == 1, len(jobs) == 1, [])
+    second = cards._cards[2]
+    assert texts(second.report) == ["Show x.html here", "sub/x.html in a tab of its own"]
+    assert (second.page.visible, second.again.visible, second.results.visible) == (False, False, True)
+
+
+def test_a_job_that_cannot_be_queued_for_the_disk_says_why(session, tab, told, monkeypatch):
+    done = []
+    monkeypatch.setattr(session.jobs, "submit", done.append)
+
+    def full():
+        raise OSError("the disk is full")
+
+    place = ui.row()
+    assert asyncio.run(runs_jobs.submit(place, session, lambda: "an order")) is True
+    assert asyncio.run(runs_jobs.submit(place, session, full)) is False
+    assert (done, told) == (["an order"], ["the disk is full"])
+
+
+@pytest.mark.parametrize("error", [OSError("the disk is full"), ValueError("no such key")])
+def test_a_slider_whose_value_cannot_be_written_says_why_and_shows_nothing_new(board, told, monkeypatch, error):
+    def refuse(key, typed):
+        raise error
+
+    monkeypatch.setattr(board.session, "set", refuse)
+    asyncio.run(board._set(LEO, "6 cm"))
+    assert (told, board.shows, board.last) == ([str(error)], [], None)
+
+
+def test_what_is_shown_follows_the_sliders_and_the_mission(session, board, told, monkeypatch):
+    """One that moves is shown with its value, in the mission as another tab has set it meanwhile."""
+    geo = "terminals.geo_aperture"
+
+    def seen():
+        held = board.shows[-1].mission.terminals
+        return len(board.shows), round(100.0 * held.leo_aperture_m), round(100.0 * held.geo_aperture_m)
+
+    marks = []
+    monkeypatch.setattr(board, "_mark", lambda: marks.append(session.draft.values[LEO].typed))
+    asyncio.run(board._reload())
+    first = seen()
+    asyncio.run(board._reload())
+    assert (first[:2], seen()) == ((1, 5), first)  # nothing is new
+    asyncio.run(board._set(LEO, "6 cm"))
+    assert (seen()[:2], marks, board.board.rows[LEO].typed) == ((2, 6), ["6 cm"], "6 cm")
+    board.board.rows[LEO]._begin("8 cm")
+    session.set(geo, "21 cm")
+    asyncio.run(board._reload())
+    assert seen() == (3, 8, 21)
+    assert session.draft.values[LEO].typed == "6 cm" and told == []
+    asyncio.run(board._try("no.such.key", "1"))
+    assert len(told) == 1 and "no.such.key" in told[0]
+    asyncio.run(board._try(geo, "22 cm"))  # it is not busy with what was refused
+    assert seen() == (4, 6, 22)
+
+
+def test_of_questions_that_wait_the_newest_alone_is_answered(session, board, monkeypatch):
+    gate, asked = asyncio.Event(), []
+
+    async def slow(page, question):
+        await gate.wait()
+        return question()
+
+    def question(name):
+        def ask():
+            asked.append(name)
+            return Attempt(session.draft.with_text(f"{TEXT}# {name}\n"), name)
+
+        return ask
+
+    async def three():
+        first = asyncio.create_task(board._ask(question("first")))
+        await asyncio.sleep(0)
+        for name in ("second", "third"):
+            await board._ask(question(name))
+        gate.set()
+        await first
+
+    monkeypatch.setattr(sliders, "in_thread", slow)
+    asyncio.run(three())
+    assert (asked, board.shows, board._busy) == (["first", "third"], ["first", "third"], False)
