@@ -1366,3 +1366,128 @@ def test_the_form_leaves_a_table_that_another_mission_does_not_have(opened, sess
     session.change(session.draft.with_text('name = "two"\n[terminals]\nleo_aperture = "5 cm"\n'))
     page._all()
     assert page.form.table == next(iter(mission.tables(session.draft)))
+
+
+# -------------------------------------------------------------------------------------------- what is rarely the case
+def test_a_text_with_a_mark_and_line_ends_of_windows_is_edited_without_and_keeps_them(session, opened, notes):
+    session.draft.path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
+    session.reopen()
+    page = opened()
+    assert page.editor.value == page.shown == TEXT
+    typed = TEXT.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"')
+    page._text(SimpleNamespace(value=typed))
+    assert (notes, page.shown, session.draft.values[LEO].typed) == ([], typed, "6 cm")
+    assert session.draft.text == "\ufeff" + typed.replace("\n", "\r\n")
+    session.save()
+    assert session.draft.path.read_bytes() == b"\xef\xbb\xbf" + typed.replace("\n", "\r\n").encode()
+
+
+@pytest.mark.parametrize(("added", "table"), [("[beacon]", "beacon"), ("[orbit.leo.limits]", "orbit")])
+def test_an_inner_table_that_was_added_is_shown_with_its_outermost_one(opened, added, table):
+    page = opened()
+    with page.section:
+        page._other(added)
+    assert (page.form.table, chosen(page)) == (table, [table])
+    assert all(mission_form.table_of(key) == table for key in page.form._rows) and page.form._rows
+
+
+@pytest.mark.parametrize(
+    ("draft", "lost"),
+    [
+        (lambda session: session.draft, ""),
+        (lambda session: session.draft.set(LEO, "6 cm"), "Changes that are not saved will be lost."),
+        (lambda session: Draft.shipped(session.inside("n.toml")), ""),
+        (lambda session: Draft.shipped(session.inside("n.toml")).with_text(preset_text("tbird")), ""),
+        (
+            lambda session: Draft.shipped(session.inside("n.toml")).set(LEO, "6 cm"),
+            "n.toml is not on disk and will be lost; save it first to keep it.",
+        ),
+    ],
+)
+def test_what_a_mission_can_begin_from_again_is_not_lost(session, draft, lost):
+    session.replace(draft(session))
+    assert mission._lost(session) == lost
+    if session.draft.path.exists():
+        session.draft.path.unlink()
+        assert mission._lost(session) == "leo-geo.toml is not on disk and will be lost; save it first to keep it."
+
+
+def test_a_text_that_the_disk_does_not_take_is_refused(session, opened, told, monkeypatch):
+    def full(draft, name):
+        raise OSError("the disk is full")
+
+    page = opened()
+    monkeypatch.setattr(session, "_keep", full)
+    page._text(SimpleNamespace(value=f"{TEXT}# more\n"))
+    assert (told, session.draft.text) == (["the disk is full"], TEXT)
+
+
+def test_what_is_typed_into_a_mission_that_was_opened_anew_is_not_taken_although_its_text_is_the_same(
+    session, opened, notes
+):
+    page = opened()
+    editor = page.editor
+    session.replace(session.draft)
+    page._text(SimpleNamespace(value=f"{TEXT}# more\n"))
+    assert (session.draft.text, len(notes), notes[0][1]) == (TEXT, 1, {"type": "warning"})
+    assert page.editor is not editor and page.editor.value == TEXT
+    page._text(SimpleNamespace(value=f"{TEXT}# more\n"))
+    assert (session.draft.text, len(notes)) == (f"{TEXT}# more\n", 1)
+
+
+def test_a_mission_that_is_a_link_to_another_folder_is_not_opened(session, dialogs, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("outside") / "b.toml"
+    outside.write_text(TEXT, "utf-8")
+    (session.folder / "b.toml").symlink_to(outside)
+    mission._open(session, lambda table: None)
+    assert select(dialogs[0]).options == ["b.toml", "leo-geo.toml"]
+    assert select(dialogs[0]).value == "b.toml"
+    with pytest.raises(NameRefusedError, match=r"is outside of"):
+        dialogs[0].do()
+    assert (session.draft.path.name, session.opened) == ("leo-geo.toml", 0)
+
+
+def test_a_new_mission_has_the_name_of_what_it_begins_from_whatever_was_open(session, dialogs):
+    session.save("other.toml")
+    (session.folder / "tbird.toml").touch()
+    mission._new(session, lambda table: None)
+    dialogs[0].do()
+    assert session.draft.path.name == "leo-geo-2.toml"
+    select(dialogs[0]).value = "tbird"
+    dialogs[0].do()
+    assert session.draft.path.name == "tbird-2.toml"
+
+
+@pytest.mark.parametrize(("typed", "name"), [("B.TOML", "B.TOML.toml"), ("a.toml.old", "a.toml.old.toml")])
+def test_a_name_that_ends_otherwise_gets_the_ending_by_which_missions_are_found(session, dialogs, typed, name):
+    mission._save_as(session, lambda table: None)
+    next(each for each in dialogs[0].place.descendants() if isinstance(each, ui.input)).value = typed
+    dialogs[0].do()
+    assert [path.name for path in session.missions()] == sorted([name, "leo-geo.toml"])
+
+
+def test_a_table_that_is_gone_to_ends_the_search(opened):
+    page = opened()
+    page.search.value = "divergence"
+    assert page.form.sought == "divergence"
+    with page.section:
+        page._show("answer")
+    assert (page.search.value, page.form.sought, page.form.table, chosen(page)) == ("", "", "answer", ["answer"])
+
+
+@pytest.mark.parametrize(
+    ("sought", "found"),
+    [("leo_aperture = 5 CM", [LEO]), ("terminals.GEO_ap", [GEO]), ("aperture = 5 cm paper", [LEO]), ("= 5 parsec", [])],
+)
+def test_a_key_is_looked_for_with_its_value_as_its_line_has_them(opened, sought, found):
+    page = opened()
+    with page.section:
+        page.form.show("beacon", sought)
+    assert [*page.form._rows] == found
+
+
+@pytest.mark.parametrize("count", [49, 51])
+def test_of_many_tables_the_first_fifty_are_listed(session, opened, count):
+    names = [f"t{k}" for k in range(count)]
+    session.change(session.draft.with_text('name = "x"\n' + "".join(f"[{name}]\nx = 1\n" for name in names)))
+    assert [*opened().entries] == ["general", *names][:50]
