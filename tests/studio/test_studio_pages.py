@@ -2974,3 +2974,53 @@ def test_of_questions_that_wait_the_newest_alone_is_answered(session, board, mon
     monkeypatch.setattr(sliders, "in_thread", slow)
     asyncio.run(three())
     assert (asked, board.shows, board._busy) == (["first", "third"], ["first", "third"], False)
+
+
+def test_the_form_begins_anew_with_a_recording_where_nothing_was_chosen_for_one_before(bench):
+    bench.answers["words.csv"] = Listing((), None, ())
+    put_in(bench, "words.csv", "stage.csv")
+    asyncio.run(bench.take(bench.files["w"]))
+    assert (bench.form.seen, bench.form.setting.name, bench.form.setting.drive) == ("w", "words-mirror", None)
+    asyncio.run(bench.take(bench.files["s"]))
+    assert (bench.form.seen, bench.form.setting.name, bench.form.setting.drive) == ("s", "stage-mirror", 0)
+    bench.keep(replace(bench.form, setting=replace(bench.form.setting, name="mine", drive=None)))
+    asyncio.run(bench.see("s"))
+    assert bench.form.setting.name == "mine"  # it is shown already
+
+
+def test_the_form_begins_anew_once_all_recordings_were_removed(bench):
+    put_in(bench, "stage.csv")
+    asyncio.run(bench.take(bench.files["s"]))
+    asyncio.run(bench.remove("s"))
+    assert (bench.form.seen, bench.form.setting.name) == ("", "stage-mirror")
+    put_in(bench, "other.csv")
+    asyncio.run(bench.take(bench.files["o"]))
+    assert (bench.form.seen, bench.form.setting.name) == ("o", "other-mirror")
+
+
+TURNS = {
+    "a verdict": (Verdict("so", (), True), Verdict("so", (), False)),
+    "a title": (View("one", ("text",)), View("two", ("text",))),
+    "what is folded": (View("one", ("text",), folded=True), View("one", ("text",), folded=False)),
+    "a table that is folded": (Table("t", ("x",), [("1",)]), Table("t", ("x",), [("1",)], folded="1 row")),
+    "rows and sums": (Table("t", ("x",), [("1",), ("2",)], totals=1), Table("t", ("x", "y"), [("1", "3")])),
+    "a kind": (Soft("the text"), Verbatim("the text")),
+    "a text": ("one", "two"),
+    "points": (Points(("a", "b", "c")), Points(("a", "d"))),
+    "a figure": (Drawing("a", "one", "caption", "<svg/>"), Drawing("b", "two", "caption", "<svg/>")),
+    "a caption": (Drawing("a", "one", "before", "<svg/>"), Drawing("a", "one", "after", "<svg/>")),
+    "one within": (View("v", (Verdict("so", (), True),)), View("v", (Verdict("no", (), False), "more"))),
+}
+
+
+@pytest.mark.parametrize("what", TURNS)
+@pytest.mark.parametrize("back", [False, True])
+def test_blocks_that_take_the_place_of_others_look_as_if_they_were_the_first(tab, what, back):
+    turns = [(Soft("before"), each, "behind") for each in TURNS[what]]
+    figures = {"a": "data:a", "b": "data:b"}
+    first, second = (elements.Blocks() for _ in range(2))
+    for blocks in turns[::-1] if back else turns:
+        first.show_blocks(blocks, figures)
+    second.show_blocks(blocks, figures)
+    assert outline(first) == outline(second) != []
+    assert texts(first)[0] == "before" and texts(first)[-1] == "behind"
