@@ -982,3 +982,53 @@ def test_a_host_that_has_no_address_is_refused_with_the_reason(monkeypatch):
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
     with pytest.raises(server.StudioError, match=r"'no\.such\.host' is no address of this machine: Name or"):
         server._bound("no.such.host", 8080)
+
+
+# ----------------------------------------------------------------------------------------- a folder that is carried on
+def test_unsaved_changes_and_the_other_mission_move_with_their_folder(tmp_path):
+    before, after = tmp_path / "before", tmp_path / "after"
+    (before / "sub").mkdir(parents=True)
+    for name in ("a.toml", "sub/b.toml"):
+        (before / name).write_bytes(DEFAULT.read_bytes())
+    session = Session(before, before / "a.toml")
+    session.set(APERTURE, "6 cm")
+    session.other = Draft.open(before / "sub" / "b.toml").set(APERTURE, "7 cm")
+    before.rename(after)
+    again = Session(after)
+    assert (again.draft.path, again.draft.values[APERTURE].typed) == (after / "a.toml", "6 cm")
+    assert (again.other.path, again.other.values[APERTURE].typed) == (after / "sub" / "b.toml", "7 cm")
+    again.save()
+    assert '"6 cm"' in (after / "a.toml").read_text("utf-8") and not again.draft.changed
+
+
+def test_unsaved_changes_keep_their_line_ends_although_those_of_the_file_are_others_now(file):
+    session = Session(file.parent, file)
+    session.set(APERTURE, "6 cm")
+    text = session.draft.text
+    file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    again = Session(file.parent)
+    assert again.draft.text == text and "\r" not in text
+    assert (again.draft.changed, again.disk) == (True, "changed")
+
+
+@pytest.mark.parametrize("own", ["# mine\n", ""])
+def test_what_git_is_to_overlook_is_left_as_somebody_has_written_it(file, own):
+    Session(file.parent)
+    path = file.parent / STUDIO / ".gitignore"
+    assert path.read_text("utf-8") == "*\n"
+    path.write_text(own, "utf-8")
+    Session(file.parent)
+    assert path.read_text("utf-8") == own
+
+
+def test_a_mission_in_an_inner_folder_is_the_one_that_is_gone_on_with(file):
+    inner = file.parent / "sub" / "leo-geo.toml"
+    inner.parent.mkdir()
+    inner.write_text(file.read_text("utf-8").replace('"5 cm"', '"9 cm"'), "utf-8")
+    session = Session(file.parent, inner)
+    session.set(APERTURE, "6 cm")
+    again = Session(file.parent)
+    assert (again.draft.path, again.name_of(again.draft.path)) == (inner, "sub/leo-geo.toml")
+    inner.unlink()
+    again.save()
+    assert '"6 cm"' in inner.read_text("utf-8") and '"6 cm"' not in file.read_text("utf-8")
