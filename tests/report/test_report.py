@@ -20,6 +20,7 @@ from microrad import report
 from microrad.core import folder, machine
 from microrad.link.budget.lines import FREE_SPACE_LOSS
 from microrad.link.requirement import Requirement
+from microrad.mirror import Variant
 from microrad.mission import file as missionfile
 from microrad.report.data import finite
 from microrad.report.page import templates as scripts
@@ -1428,3 +1429,450 @@ def test_the_bandwidth_of_the_fine_loop_stands_in_the_chain_without_a_power_of_t
     fine = ns(best=ns(design=design), scene=ns(loop=ns(timing=ns(period_s=1e-4))))
     lines = chain._loop(chain_study(fine_pointing=fine)).lines
     assert lines[-2:] == ("LQG at 10 kHz", "modulus 0.50, 1230 Hz wide")
+
+
+# ------------------------------------------------------------------------------------ the words of a study, unlike each
+def words_study(**changes):
+    """What the verdict in words is made of, each number unlike the others; three requirements, two of them missed."""
+    m = ns(
+        communication=ns(data_rate_bit_s=625e6, pointing_error_rad=7.5e-6),
+        requirement=ns(residual_statistic="rms", pointing_error_rad=9e-6, margin_db=3.5),
+        conventions=ns(residual="radial"),
+        jitter=None,
+    )
+    given = {
+        "file": ns(mission=m, sources={}),
+        "fine_case": None,
+        "fine_pointing": None,
+        "day": None,
+        "residual": ns(controller="PID", freq_hz=25.0, trace=ns(peak_rad=2.5e-5, rms_rad=1.6e-5)),
+        "left_rad": lambda run: 1.21e-5,
+        "closes": True,
+        "margin_db": 2.25,
+        "beacon": ns(margin_db=1.5),
+        "answer": ns(margin_db=0.0),
+        "static": ns(margin_db=4.25),
+        "achieved": ns(margin_db=-0.75),
+        "requirements": (
+            Requirement("residual", "residual", "rad", 9e-6, 1.2e-5, -3e-6, "the residual: lag"),
+            Requirement("beacon", "beacon margin", "dB", 3.0, 4.0, 1.0, "width"),
+            Requirement("communication", "communication margin", "dB", 3.5, 2.25, -1.25, "the residual: lag"),
+        ),
+    }
+    return ns(**given | changes)
+
+
+@pytest.fixture
+def signs(monkeypatch):
+    monkeypatch.setattr(words, "with_sign", lambda text, sources, name: f"{text} <{name}>")
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: "")
+
+
+@pytest.mark.parametrize(
+    ("margins", "said"),
+    [
+        (
+            (-1.5, -2.5, -3.5),
+            "The link does not close: beacon −1.50 dB <margin_db.beacon>, answer −2.50 dB <margin_db.answer>, "
+            "communication −3.50 dB <margin_db.judged>, at 625 Mbit/s and a simulated residual of 12.1 µrad (rms).",
+        ),
+        (
+            (1.5, -0.01, 0.0),
+            "The link does not close: answer −0.01 dB <margin_db.answer>, at 625 Mbit/s and a simulated residual of "
+            "12.1 µrad (rms).",
+        ),
+    ],
+)
+@pytest.mark.usefixtures("signs")
+def test_the_headline_names_each_link_that_does_not_close_and_none_at_0_db(margins, said):
+    beacon, answer, judged = margins
+    of = words_study(closes=False, beacon=ns(margin_db=beacon), answer=ns(margin_db=answer), margin_db=judged)
+    assert words.headline(of) == said
+
+
+@pytest.mark.usefixtures("signs")
+def test_the_headline_of_a_link_that_closes_names_each_requirement_that_is_missed(monkeypatch):
+    at = "625 Mbit/s and a simulated residual of 12.1 µrad (rms)"
+    of = words_study()
+    assert words.headline(of) == (
+        "Not every requirement is met: residual (−3 µrad) and communication margin (−1.25 dB). "
+        f"The margin is +2.25 dB <margin_db.judged> at {at}."
+    )
+    unknown = replace(of.requirements[1], unknown="the receiver's noise")
+    assert words.headline(words_study(requirements=(unknown,))).startswith(
+        "Not every requirement is met: beacon margin (the receiver's noise). The margin"
+    )
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: "far")
+    met = words_study(requirements=of.requirements[1:2])
+    assert words.headline(met) == (
+        f"The link closes, with a margin of +2.25 dB <margin_db.judged> at {at}, and every requirement is met. "
+        "The mirror model is extrapolated."
+    )
+    judged = words_study(fine_case=ns(controller="LQG"), requirements=of.requirements[1:2])
+    monkeypatch.setattr(words, "time_kept", lambda required: "99.7 % of the time")
+    assert words.headline(judged) == (
+        "The link closes, with a margin of +2.25 dB <margin_db.judged> at 625 Mbit/s for 99.7 % of the time, and "
+        "every requirement is met."
+    )
+
+
+@pytest.mark.parametrize(
+    ("missed", "said"),
+    [
+        ((), "would meet what is required"),
+        ((0,), "would miss residual"),
+        ((0, 2), "would miss residual and communication margin"),
+    ],
+)
+def test_the_papers_loop_beside_the_judged_one_names_all_that_it_would_miss(missed, said):
+    every = words_study().requirements
+    judged = [each if k in missed else replace(each, margin=1.0) for k, each in enumerate(every)]
+    assert words._papers_loop(words_study(papers_loop=judged)) == (
+        f"For comparison alone: the paper's loop (PID, sine of 25 Hz) {said}. It leaves 12.1 µrad (rms) where 9 µrad "
+        "is allowed, and a margin of −0.75 dB where 3.50 dB is required."
+    )
+    assert words._papers_loop(words_study(papers_loop=[])) == ""
+
+
+def test_what_limits_two_requirements_alike_is_told_once(monkeypatch):
+    monkeypatch.setattr(words, "hysteresis_cost", lambda study: "")
+    monkeypatch.setattr(words, "found", lambda study: "It is found.")
+    of = words_study()
+    assert words.explanation(of) == ["What limits it: lag.", "It is found."]
+    other = (*of.requirements, replace(of.requirements[1], margin=-1.0), replace(of.requirements[1], unknown="a noise"))
+    assert words.explanation(words_study(requirements=other))[0] == "What limits it: lag; width; a noise."
+    assert words.explanation(words_study(requirements=())) == ["It is found."]
+
+
+def test_the_papers_loop_is_told_by_its_peaks_and_rms_beside_the_comparison_model(monkeypatch):
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: "a drive of 3 V" if run.freq_hz == 25.0 else "")
+    other = ns(residual=ns(freq_hz=50.0), margin_db=-1.5)
+    of = words_study(comparison=other, other_readings=[])
+    of.left_rad = lambda run: 1.21e-5 if run.freq_hz == 25.0 else 3.4e-5
+    assert words.papers_loop(of) == [
+        "As budgeted, at 7.5 µrad, the margin is +4.25 dB; 3.5 dB is required.",
+        "The loop (PID, 25 Hz) leaves 25 µrad at its peaks and 16 µrad rms on its axis, times √2 for two equal axes; "
+        "9 µrad (rms) is allowed.",
+        "Not to be relied on: a drive of 3 V.",
+        "On the mission's comparison model of the mirror the residual is 34 µrad and the margin −1.50 dB.",
+    ]
+    of.comparison, of.residual.freq_hz = None, 50.0
+    of.file.mission.jitter, of.file.mission.conventions.residual = object(), "per-axis"
+    said = words.papers_loop(of)
+    assert said[0].startswith("As budgeted, at 7.5 µrad, the static margin is +4.25 dB;")
+    assert len(said) == 2 and "rms on its axis; 9 µrad" in said[1]
+
+
+def test_hysteresis_costs_the_named_controllers_of_both_loops_and_no_others():
+    costs = [
+        Cost("sine of 25 Hz", "PID", "given", -1.5, -2e6),
+        Cost("sine of 25 Hz", "PI", "given", -2.5, -3e6),
+        Cost("sine of 5 Hz", "PID", "given", -3.5, -4e6),
+        Cost("sine of 25 Hz", "PID", "comparison", -4.5, -5e6),
+        Cost(words.FINE, "LQG", "given", -0.25, math.nan),
+        Cost(words.FINE, "PID", "given", -5.5, -6e6),
+    ]
+    of = words_study(performance=ns(costs=costs, outage=0.003), fine_pointing=ns(best=ns(design=ns(name="LQG"))))
+    assert words.hysteresis_cost(of) == (
+        f"Hysteresis costs the link 1.50 dB or 2 Mbit/s with PID (sine of 25 Hz) and 0.25 dB with LQG ({words.FINE}), "
+        "at the pointing loss that is exceeded 0.3 % of the time."
+    )
+    of.performance.costs = [replace(costs[0], margin_db=0.0), replace(costs[4], margin_db=0.5)]
+    assert words.hysteresis_cost(of) == ""
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "least", "most", "beyond"),
+    [
+        (6.0, 0.0, 180.0, ()),
+        (6.5, -50.0, 500.0, ("the range that the mirror was identified for",)),
+        (6.0, 0.0, 179.0, ("the amplifier's range",)),
+        (6.0, 1.0, 180.0, ("the amplifier's range",)),
+        (7.0, 0.0, 180.0, ("the range that the mirror was identified for", "the amplifier's range")),
+    ],
+)
+def test_loops_are_drawn_beyond_what_is_known_of_the_mirror_or_what_its_amplifier_can(amplitude, least, most, beyond):
+    m = ns(
+        mirror=ns(bias_v=6.0, drive_min_v=0.0, drive_max_v=12.0),
+        scenario=ns(loop_amplitude_v=amplitude),
+        amplifier=ns(output_min_v=least, gain=15.0, output_max_v=most),
+    )
+    loops = [ns(freq_hz=5.0, clamped=0), ns(freq_hz=80.0, clamped=3), ns(freq_hz=0.5, clamped=1)]
+    assert words._of_loops(ns(file=ns(mission=m), loops=loops)) == [
+        *(f"the hysteresis loops are drawn for a drive beyond {each}" for each in beyond),
+        "hysteresis loop at 80 Hz: 3 samples beyond the identified rate",
+        "hysteresis loop at 0.5 Hz: 1 sample beyond the identified rate",
+    ]
+
+
+def test_each_run_has_its_own_counts_and_those_of_the_inverse_are_added(monkeypatch):
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: "b is far" if run.trace.name == "b" else "")
+    first = ns(clamped=2, inverse_clamped=3, saturated=0, slew_limited=7, alternating=0)
+    second = ns(clamped=0, inverse_clamped=1, saturated=4, slew_limited=0, alternating=9)
+    runs = [ns(trace=ns(name="a", counts=first)), ns(trace=ns(name="b", counts=second))]
+    assert words._of_runs(ns(runs=runs)) == [
+        "b is far",
+        "a: 5 steps beyond the identified rate",
+        "a: 7 slew-limited steps",
+        "b: 1 step beyond the identified rate",
+        "b: 4 saturated samples",
+        "b: 9 reversals of the command within 10 samples of the last",
+    ]
+
+
+def test_a_warning_of_a_distance_costs_by_the_range_of_its_own_link():
+    """A range of twice, of ten times and of half of what each link is budgeted for."""
+    m = ns(communication="c", beacon="b", answer="a", range_m=lambda of: {"c": 2e7, "b": 4e6, "a": 8e7}[of])
+    texts = ("beacon.distance is short", "answer.distance is long", "communication.distance is short", "of the beacon")
+    day = ns(encounters=[ns(range_most_m=4e7), ns(range_most_m=1e7)], warnings=texts)
+    found = words._of_day(ns(file=ns(mission=m), day=day))
+    assert [each.text for each in found] == list(texts)
+    assert [each.cost_db for each in found] == pytest.approx([20.0, -6.0206, 6.0206, 0.0], abs=1e-4)
+    m.beacon = None
+    assert next(each.cost_db for each in words._of_day(ns(file=ns(mission=m), day=day))) == 0.0
+    assert words._of_day(ns(file=ns(mission=m), day=None)) == []
+
+
+@pytest.mark.parametrize(
+    ("contact", "day", "pattern", "plan", "said"),
+    [
+        (True, [1], None, None, ["operations.contact is not run"]),
+        (True, [], None, None, []),
+        (True, None, None, None, []),
+        (False, [1], None, None, []),
+        (None, [1], object(), None, ["constellation is left out"]),
+        (None, None, object(), object(), []),
+        (True, [1, 2], object(), None, ["operations.contact is not run", "constellation is left out"]),
+    ],
+)
+def test_a_table_that_the_study_has_no_use_for_is_named(contact, day, pattern, plan, said):
+    operations = None if contact is None else ns(contact=object() if contact else None)
+    of = ns(
+        file=ns(mission=ns(operations=operations, constellation=pattern)),
+        contact=None,
+        day=None if day is None else ns(relay=ns(contacts=day)),
+        plan=plan,
+    )
+    assert [each.partition(":")[0] for each in words._not_run(of)] == said
+    of.contact = object()
+    assert [each.partition(":")[0] for each in words._not_run(of)] == [each for each in said if "contact" not in each]
+
+
+# ------------------------------------------------------------------------- what contributes most, of several each unlike
+def of_requirement(subject, limited_by="x", **changes):
+    return replace(Requirement(subject, subject, "rad", 1e-5, 2e-5, -1e-5, limited_by), **changes)
+
+
+def test_what_contributes_most_to_the_cone_is_the_line_of_the_largest_share():
+    lines = [ns(name="Body", value=2e-4), ns(name="mount", value=7e-5), ns(name="orbit", value=9e-5)]
+    of = ns(
+        open_loop=ns(lines=lines, variance_shares=(0.25, 0.65, 0.1), reading=ns(half_angle_rad=4.2e-4, coverage=0.876)),
+        fine_case=None,
+        requirements=(),
+    )
+    assert requirement_views.contributor(of, of_requirement("cone")) == (
+        "Mount: 65 % of the sum of squares, 70 µrad half width; the cone of 420 µrad half angle covers its partner "
+        "with a probability of 0.88"
+    )
+    assert requirement_views.contributor(of, of_requirement("cone", unknown="the noise")) == "The noise"
+
+
+def test_the_largest_loss_of_each_beam_stands_with_what_moves_its_own_margin():
+    def of_beam(name, value):
+        return ns(
+            name=name, lines=[ns(name="optics", unit="dB", value=-1.0), ns(name="Splice", unit="dB", value=value)]
+        )
+
+    tornados = [ns(of="Answer", swings=[a_swing("a.a", "W", 1.5)]), ns(of="Beacon", swings=[a_swing("b.b", "dB", 2.5)])]
+    of = ns(
+        beacon=of_beam("Beacon", -3.0),
+        answer=of_beam("Answer", -0.5),
+        links=ns(tornados=tornados),
+        fine_case=None,
+        requirements=(),
+    )
+    found = [requirement_views.contributor(of, of_requirement(subject)) for subject in ("beacon", "answer")]
+    assert found == [
+        "Splice 3.00 dB; the margin moves most with b.b: 2.50 dB for ±0.5 dB",
+        "Optics 1.00 dB; the margin moves most with a.a: 1.50 dB for ±10 %",
+    ]
+    of.links.tornados = tornados[1:]
+    assert requirement_views.contributor(of, of_requirement("answer")) == "Optics 1.00 dB"
+
+
+def test_the_residual_stands_beside_that_of_the_same_loop_at_the_same_frequency_without_hysteresis():
+    def a_run(mirror, controller, freq_hz, left_rad):
+        return ns(mirror=mirror, controller=controller, freq_hz=freq_hz, left=left_rad)
+
+    judged = a_run("given", "PID + inverse", 50.0, 8e-6)
+    runs = [
+        a_run(Variant.STRAIGHT, "PID", 50.0, 1e-6),
+        a_run(Variant.STRAIGHT, "PID + inverse", 5.0, 2e-6),
+        a_run(Variant.GIVEN, "PID + inverse", 50.0, 3e-6),
+        a_run(Variant.STRAIGHT, "PID + inverse", 50.0, 4e-6),
+    ]
+    of = ns(residual=judged, runs=[judged, *runs], left_rad=lambda run: run.left, fine_case=None, requirements=())
+    found = requirement_views.contributor(of, of_requirement("residual", "lag"))
+    assert found == "Lag: 8 µrad with hysteresis, 4 µrad without"
+
+
+@pytest.mark.parametrize("fine", [True, False])
+def test_the_pointing_loss_of_the_link_is_that_of_the_judged_case_or_of_the_papers_loop(fine):
+    """A requirement of the paper's loop, which stands beside the judged ones, is told of its own loss."""
+    own, papers = of_requirement("communication", "OLYMPUS"), of_requirement("communication", "lag")
+    of = ns(
+        achieved=ns(loss_db=lambda *lines: 1.25),
+        tornado=ns(swings=[a_swing("a.b", "W", 0.5)]),
+        fine_case=ns(outage_loss_db=2.5) if fine else None,
+        requirements=(own,),
+    )
+    moved = "; the margin moves most with a.b: 0.50 dB for ±10 %"
+    found = [requirement_views.contributor(of, each) for each in (own, papers)]
+    if fine:
+        assert found == [
+            f"Vibration (OLYMPUS), pointing loss 2.50 dB at the outage{moved}",
+            "Lag, pointing loss 1.25 dB",
+        ]
+    else:
+        assert found == [f"OLYMPUS, pointing loss 1.25 dB{moved}", f"Lag, pointing loss 1.25 dB{moved}"]
+
+
+@pytest.mark.parametrize(
+    ("cause", "said"),
+    [
+        ("OLYMPUS", "Vibration (OLYMPUS): 3 µrad of 5 µrad rms with hysteresis, 36 % of the sum of squares"),
+        ("hysteresis", "Hysteresis: 4 µrad of 5 µrad rms with hysteresis, 64 % of the sum of squares"),
+    ],
+)
+def test_a_part_of_the_fine_loop_is_one_of_those_alone_or_of_those_left_out(cause, said):
+    parts = [ns(name="noise", rms_rad=1e-6), ns(name="OLYMPUS", rms_rad=3e-6)]
+    differences = [ns(name="quantisation", added_rad=2e-6), ns(name="hysteresis", added_rad=4e-6)]
+    budget = ns(parts=parts, differences=differences, full_rad=5e-6)
+    of = ns(fine_pointing=ns(budget=budget), fine_case=None, requirements=())
+    assert requirement_views.contributor(of, of_requirement("fine pointing", cause)) == said
+
+
+def test_the_stroke_is_of_the_axis_with_the_least_to_spare():
+    study_of = stroke_study(margin_rad=-5e-5)
+    for each, total in zip(study_of.fine_pointing.scene.own_stroke, (9e-4, 4e-4), strict=True):
+        each.total_rad = total
+    study_of.fine_case, study_of.requirements = None, ()
+    found = requirement_views.contributor(study_of, of_requirement("stroke", "body pointing"))
+    assert found == "Body pointing: 300 µrad of the 400 µrad needed at the line of sight"
+
+
+def test_a_stroke_of_which_nothing_would_be_left_is_advised_of_the_mirror():
+    """The largest line is 300 µrad; the mirror moves half as far as the line of sight: 150 µrad lack in all of it."""
+    missed = of_requirement("stroke")
+    at = requirement_views.advice(stroke_study(margin_rad=-1.5e-4), missed)
+    assert at == "; to meet it, raise mirror.travel"
+    of = stroke_study(margin_rad=-5e-5)
+    of.fine_pointing.scene.own_stroke[1].lines[0].name = "Wheel"
+    assert requirement_views.advice(of, missed) == "; to meet it, raise mirror.travel"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (requirement_views.OPTICAL_NOISE, "change fine_pointing.optical_sensor"),
+        (requirement_views.GAUGE_NOISE, "change fine_pointing.strain_gauge"),
+        ("a", "raise fine_pointing.rate"),
+    ],
+)
+def test_a_source_of_the_loop_is_advised_by_what_it_is(name, said):
+    """Also where a source of the same name is stated; several that are correlated have no advice."""
+    missed = of_requirement("error budget")
+    stated = {name: ns(kind="random", size_rad=1e-6)}
+    share = ns(name=name, allowed=0.5, contribution=ns(kind="loop"))
+    of = ns(
+        requirements=[missed],
+        error_budget=ns(judged=[ns(shares=[share])]),
+        file=ns(mission=ns(error_budget=ns(sources=stated))),
+    )
+    assert requirement_views.advice(of, missed) == f"; to meet it, {said}"
+    share.contribution.kind, share.name = "random", "a and b"
+    assert requirement_views.advice(of, missed) == ""
+
+
+# ------------------------------------------------------------------------------------------ what only some pages have
+@pytest.mark.parametrize(
+    ("ahead", "fine", "said"),
+    [
+        (None, True, None),
+        (ns(corrected=False, error_rad=2e-6), True, None),
+        (ns(corrected=True, error_rad=0.0), True, None),
+        (ns(corrected=True, error_rad=2e-6), False, ""),
+        (ns(corrected=True, error_rad=2e-6), True, ": at most 1.25 dB more for the best loop"),
+    ],
+)
+def test_what_a_correction_of_the_point_ahead_leaves_costs_the_best_loop_by_the_beams_fall(ahead, fine, said):
+    """A beam that loses 1 dB a square of 4 µrad: from 4 µrad, which the outage's loss is, to 6 µrad."""
+    asked = []
+    fall = ns(loss_db=lambda rad: (rad / 4e-6) ** 2, error_rad=lambda db: 4e-6 * math.sqrt(db))
+    cases = ns(case=lambda *of: asked.append(of) or ns(outage_loss_db=1.0))
+    of = ns(
+        file=ns(mission=ns(point_ahead=ahead)),
+        links=ns(data=ns(beam=ns(fall=fall))),
+        fine_pointing=ns(best=ns(design=ns(name="LQG"))) if fine else None,
+        performance=cases,
+    )
+    expected = (
+        [] if said is None else [f"What the correction of point-ahead leaves (2 µrad) is not in these errors{said}."]
+    )
+    assert page._left_out(of) == expected
+    assert asked == ([(page.FINE, "LQG", Variant.GIVEN)] if said else [])
+    of.performance.case = lambda *which: None
+    assert page._left_out(of) == [each.replace(f"errors{said}", "errors") for each in expected]
+
+
+@pytest.mark.parametrize(
+    ("fine", "light", "angle", "said"),
+    [(True, True, True, True), (False, True, True, False), (True, False, True, False), (True, True, False, False)],
+)
+def test_the_noise_of_the_loop_stands_beside_what_the_light_allows_where_both_are_known(fine, light, angle, said):
+    of = ns(
+        links=ns(tracking=ns(noise_equivalent_angle=ns(value=3.456e-7) if angle else None) if light else None),
+        fine_pointing=ns(scene=ns(loop=ns(optical=ns(noise_rad=5e-7)))) if fine else None,
+    )
+    words_of = (
+        "The fine-pointing loop is simulated with 500 nrad of noise in its optical sensor; that light allows 346 nrad."
+    )
+    found = page._loop_noise(of)
+    assert found == ([words_of] if said else [])
+
+
+def test_the_link_is_shown_under_each_error_but_those_of_a_mirror_without_hysteresis(monkeypatch):
+    monkeypatch.setattr(page, "performance_view", lambda *given: given)
+    monkeypatch.setattr(page, "residuals_sentence", lambda found: "a sentence")
+    monkeypatch.setattr(page, "_left_out", lambda study: ["left out"])
+    mirrors = (Variant.STRAIGHT, Variant.GIVEN, Variant.COMPARISON, Variant.STRAIGHT, Variant.GIVEN)
+    cases = [ns(mirror=mirror, k=k) for k, mirror in enumerate(mirrors)]
+    of = ns(
+        performance=ns(cases=cases, costs="costs", outage=0.003),
+        links=ns(under_jitter=ns(k="jitter")),
+        fine_pointing=ns(best=ns(design=ns(name="LQG"))),
+    )
+    shown, *others = page.cost_view(of)
+    assert [each.k for each in shown] == ["jitter", 1, 2, 4]
+    assert others == ["costs", 0.003, ["a sentence", "left out"], "LQG"]
+    of.links.under_jitter = of.fine_pointing = None
+    shown, *others = page.cost_view(of)
+    assert ([each.k for each in shown], others[-1]) == ([1, 2, 4], "")
+
+
+@pytest.mark.parametrize(("rates", "rate"), [(None, 4e8), ((), None), ((1e8, 2e8), None)])
+def test_a_contact_has_one_rate_unless_it_is_stepped_with_range(monkeypatch, rates, rate):
+    seen = []
+    monkeypatch.setattr(page, "contact_sentences", lambda *given: seen.append(given) or ["told"])
+    monkeypatch.setattr(page, "windows_table", lambda run, quantile: f"windows of {run} at {quantile}")
+    monkeypatch.setattr(page, "transitions_table", lambda run: f"transitions of {run}")
+    operations = ns(contact=ns(number=3), rates_bit_s=rates)
+    day = ns(operations=operations, data=ns(table=ns(data_rate_bit_s=4e8)))
+    of = ns(contact="run", fine_pointing=ns(best=ns(design=ns(name="LQG")), quantile=0.997))
+    view = page._contact(of, day)
+    assert seen == [("run", 3, "LQG", rate)]
+    assert (list(view.blocks), view.folded) == (["told", "windows of run at 0.997", "transitions of run"], True)
+    for lacking in (ns(contact=None, rates_bit_s=None), None):
+        assert page._contact(of, ns(operations=lacking, data=day.data)) is None
+    assert page._contact(ns(contact=None, fine_pointing=of.fine_pointing), day) is None
+    assert page._contact(ns(contact="run", fine_pointing=None), day) is None

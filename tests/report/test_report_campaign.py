@@ -2863,3 +2863,155 @@ def test_one_thing_of_a_campaign_is_told_in_the_singular():
     each = Sensitivity("margin", 40, first, {}, {}, 0.9, "")
     (figure,) = drawing.sensitivity(a_campaign([a_cell()], sensitivities=(each,)))
     assert figure.caption.endswith(" 1 input with smaller indices is in the table only.")
+
+
+# ------------------------------------------------------------------------------------- several of a kind, out of order
+@pytest.mark.parametrize(("count", "step", "drawn_"), [(1500, 1, 1500), (1501, 2, 751), (4501, 4, 1126)])
+def test_of_more_rows_than_a_region_has_room_for_every_so_many_th_is_drawn(count, step, drawn_):
+    """Rows of another combination stand between them and are not counted."""
+    cell = np.zeros(count + 2)
+    cell[[1, 3]] = 1.0
+    own, numbers = np.flatnonzero(cell == 0.0), np.arange(count + 2.0)
+    columns = {"mirror.alpha": 1.0 + numbers, "jitter.rms": 1e-6 * (1.0 + numbers), "margin": 0.001 * numbers}
+    summary = two_cells(sample={"cell": cell, "row": numbers, **columns})
+    figure = drawing.region(summary, TWO_SIDES[1], 0, ["mirror.alpha", "jitter.rms"])
+    assert figure.columns["mirror.alpha"].tolist() == (1.0 + own[::step]).tolist()
+    assert figure.columns["margin"].size == drawn_ <= drawing.MOST_POINTS
+    assert figure.caption.startswith(f"{drawn_} rows of mirror = b.toml")
+
+
+def test_of_seven_worst_rows_six_are_drawn_each_counted_in_its_own_combination():
+    cells = (1, 0, 1, 1, 0, 1, 0)
+    worst = [WorstTrace(c, 10 + k, "margin", 1.0, *[np.arange(1.0, 5.0)] * 3) for k, c in enumerate(cells)]
+    drawn_ = campaign_figures(two_cells(worst=worst))["worst"]
+    assert [(figure.name, figure.title, figure.caption.split(" of ")[0]) for figure in drawn_] == [
+        ("campaign-worst-2-1", "Worst row in time", "Row 10"),
+        ("campaign-worst-1-1", "Worst row in time", "Row 11"),
+        ("campaign-worst-2-2", "Second worst row in time", "Row 12"),
+        ("campaign-worst-2-3", "Third worst row in time", "Row 13"),
+        ("campaign-worst-1-2", "Second worst row in time", "Row 14"),
+        ("campaign-worst-2-4", "Fourth worst row in time", "Row 15"),
+    ]
+
+
+def test_inputs_are_said_to_matter_most_where_each_of_them_does():
+    """A third input has an index, too, but a small one."""
+    first = {"mirror.alpha": between_ends(0.5), "jitter.rms": between_ends(0.25), "c.d": between_ends(0.04)}
+    summary = a_campaign([a_cell()], sensitivities=(Sensitivity("margin", 30, first, {}, {}, 0.9, ""),))
+    said = {
+        inputs: drawing._mattering(summary, "margin", inputs)
+        for inputs in (("jitter.rms", "mirror.alpha"), ("mirror.alpha", "c.d"), ("jitter.rms",), ("c.d",))
+    }
+    assert list(said.values()) == [", the inputs that matter most to it", "", ", the input that matters most to it", ""]
+    assert drawing._mattering(summary, "residual_quantile", ("jitter.rms",)) == ""
+
+
+def test_outputs_of_which_nothing_is_known_stand_together_by_their_reason():
+    known = Sensitivity("margin", 30, {"mirror.alpha": between_ends(0.5)}, {}, {}, 0.9, "")
+    unknown = [
+        Sensitivity(name, 30, {}, {}, {}, 0.9, note)
+        for name, note in (("a", "too few rows"), ("b", "it does not vary"), ("c", "too few rows"))
+    ]
+    limits = [Limit(name, 1.0, None, "") for name in ("c", "b", "margin", "a")]
+    summary = a_campaign([a_cell()], limits=limits, sensitivities=(unknown[0], known, *unknown[1:]))
+    assert campaign_words.matters(summary) == [
+        "What matters most to margin (first-order Sobol index): mirror.alpha 0.50 (0.25 to 0.62).",
+        "What matters to a and c is not known: too few rows.",
+        "What matters to b is not known: it does not vary.",
+    ]
+
+
+def test_at_most_three_of_four_inputs_that_matter_are_named():
+    first = {key: between_ends(index) for key, index in (("a", 0.1), ("b", 0.3), ("c", 0.06), ("d", 0.2))}
+    (said,) = campaign_words.matters(
+        a_campaign([a_cell()], sensitivities=(Sensitivity("margin", 30, first, {}, {}, 0.9, "no total ones"),))
+    )
+    assert said == (
+        "What matters most to margin (first-order Sobol index): b 0.30 (0.15 to 0.38), d 0.20 (0.10 to 0.25), "
+        "a 0.10 (0.05 to 0.12); no total ones."
+    )
+
+
+def test_a_radius_that_the_tail_was_asked_for_is_told_by_its_own_interval_once():
+    """Read off the curve at 3 µrad it would be 0.2 %."""
+    own = Interval(0.003, 0.0025, 0.004, 0.9)
+    tail = short_tail(beyond={3e-6: own}, variance={})
+    limits = (Limit("residual_quantile", None, 3e-6, ""), Limit("residual_rms", None, 2e-6, ""))
+    said = campaign_words.tail_sentences(a_campaign([], limits=limits), a_cell(tail=tail))
+    assert [each.partition("beyond ")[2] for each in said if "beyond" in each] == [
+        "2 µrad with probability 5 % (4 % to 7 % at 90 % confidence).",
+        "3 µrad with probability 0.3 % (0.25 % to 0.4 % at 90 % confidence).",
+    ]
+
+
+def test_of_several_outputs_each_is_told_with_its_one_or_two_values():
+    """Of 20 rows, 25 % and 75 % at the larger value; deviation over rows less one."""
+
+    def of_two(name, unit, low, high, at_high):
+        spread = (high - low) * math.sqrt(at_high * (1.0 - at_high) * 20.0 / 19.0)
+        mean = Interval(low + (high - low) * at_high, 0.0, 0.0, 0.9)
+        return an_output(name, unit, mean=mean, deviation=spread, least=low, most=high)
+
+    outputs = [
+        of_two("margin", "dB", 1.0, 5.0, 0.25),
+        an_output("beacon_margin", "dB", least=6.0, most=6.0),
+        of_two("residual_quantile", "rad", 2e-6, 4e-6, 0.75),
+        an_output("outage", "", least=0.25, most=0.25),
+        an_output("short", "", scale=0.01),
+    ]
+    cell = replace(a_cell(), outputs={each.name: each for each in outputs})
+    assert campaign_words.few_values(cell) == [
+        "The same in every row: beacon_margin 6.00 dB, outage 25 %.",
+        "margin has two values: 1.00 dB in 75 % of the rows, 5.00 dB in 25 %.",
+        "residual_quantile has two values: 2.00 µrad in 25 % of the rows, 4.00 µrad in 75 %.",
+    ]
+    assert campaign_words.few_values(None) == []
+
+
+def test_fresh_rows_that_keep_two_limits_less_often_name_both_or_those_that_do_not_agree():
+    of = an_optimum()
+    of.fresh.kept[1].holds = False
+    both = "margin ≥ 3 dB in 87.5 % (82.5 to 90 %) and residual_quantile ≤ 9 urad in 95 % (90 to 97.5 %)"
+    assert optimum_report.fresh_rows_sentence(of).startswith(f"Fresh rows keep {both}, below 90 %: this agrees")
+    of.confirmed, of.fresh.kept[1].agrees = False, lambda confidence: confidence != 0.9
+    assert optimum_report.fresh_rows_sentence(of).startswith(
+        "Fresh rows keep residual_quantile ≤ 9 urad in 95 % (90 to 97.5 %), which is less often than the 90 % wanted"
+    )
+    of.fresh.kept[0].agrees = of.fresh.kept[1].agrees
+    assert optimum_report.fresh_rows_sentence(of).startswith(f"Fresh rows keep {both}, which is less often")
+
+
+def test_fresh_rows_that_are_refused_have_neither_a_cost_nor_limits_in_the_text():
+    text = optimum_report.optimum_text(an_optimum(fresh=SimpleNamespace(refused="no rows", kept=(), cost=9.75)))
+    lines = text.split("\n")
+    assert lines[1] == "Fresh rows refuse it: no rows."
+    assert "margin (mean over the rows): 4.25 dB of the searched rows" in lines
+    assert not any(" fresh " in line for line in lines)
+    free = an_optimum(warnings=())
+    free.problem.limits = free.best.kept = free.fresh.kept = ()
+    assert optimum_report.optimum_text(free).split("\n")[0] == "largest margin (mean over the rows): 4.25 dB"
+    assert "deciding row" not in optimum_report.optimum_text(free)
+
+
+def test_a_map_of_as_many_steps_either_way_leaves_a_combination_that_is_not_there_grey():
+    """The second key goes across; of four combinations the last is missing."""
+    of = {("1 m", "a"): 1.0, ("2 m", "a"): 2.0, ("1 m", "b"): 4.0}
+    cells = [a_cell({"x.size": size, "y.kind": kind}, scale=scale) for (size, kind), scale in of.items()]
+    (figure,) = drawing.grid(a_campaign(cells, limits=(), sensitivities=()))
+    (first, _) = figure.sheet.panels
+    (field,) = first.all_of(Field)
+    assert plain(field.z) == [[3.0, 12.0], [6.0, "nan"]]
+    assert list(first.x.ticks.values()) == ["a", "b"] and list(first.y.ticks.values()) == ["1 m", "2 m"]
+    words = {(each.x, each.y): each.text for each in first.all_of(drawing.Words)}
+    assert words == {(0, 0): "3", (1, 0): "12", (0, 1): "6", (1, 1): "none"}
+
+
+def test_axes_of_a_region_tell_their_inputs_from_those_that_are_not_drawn():
+    """Of "first.axis.gain" the last two parts are those of another input, too."""
+    keys = ("first.axis.gain", "second.axis.gain", "mirror.plant.alpha")
+    summary = two_cells(
+        inputs=[InputText(key, "", "normal") for key in keys],
+        sample={"cell": np.zeros(3), **{key: np.array([1.0, 2.0, 4.0]) for key in (*keys, "margin")}},
+    )
+    (panel,) = drawing.region(summary, TWO_SIDES[1], 0, [keys[0], keys[2]]).sheet.panels
+    assert [panel.x.title, panel.y.title] == ["first.axis.gain", "plant.alpha"]
