@@ -1067,3 +1067,83 @@ def test_a_point_beside_slanted_edges_is_inside_of_them_or_not(point, inside):
     """At a height y the triangle reaches from 2 y / 3 to 4 - 2 y / 3."""
     ring = np.array([(0.0, 0.0), (4.0, 0.0), (2.0, 3.0), (0.0, 0.0)])
     assert odd([ring], point) is odd([ring[::-1]], point) is inside
+
+
+def test_a_row_of_the_timeline_has_all_contacts_of_its_station_and_ends_with_the_span(monkeypatch):
+    """Passes of two stations follow each other in turn; one name is that of an optical station, too."""
+    monkeypatch.setattr(figures, "timeline", lambda rows, span, epoch: (dict(rows), [name for name, _ in rows], epoch))
+
+    def of(name, ends, stations=()):
+        contacts = tuple(SimpleNamespace(start_s=end - 50.0, end_s=end) for end in ends)
+        return SimpleNamespace(name=name, contacts=contacts, stations=stations)
+
+    pair = SimpleNamespace(
+        span_s=(0.0, 1000.0), leo=SimpleNamespace(name="LOW"), epoch=SimpleNamespace(text="an epoch")
+    )
+    day = SimpleNamespace(
+        view=SimpleNamespace(pair=pair, umbra_s="eclipses"),
+        relay=of("relay", (100.0, 1020.0)),
+        direct=of("direct downlink", (200.0, 300.0, 400.0, 1049.0), ("b", "a", "b", "a")),
+        optical=of("optical downlink", (500.0, 600.0), ("a", "a")),
+    )
+    rows, names, epoch = figures.contacts_figure(day)
+    assert (names, epoch) == (["relay", "direct: b", "direct: a", "optical: a", "eclipse of LOW"], "an epoch")
+    assert rows["relay"].tolist() == [[50.0, 100.0], [970.0, 1000.0]]
+    assert rows["direct: b"].tolist() == [[150.0, 200.0], [350.0, 400.0]]
+    assert rows["direct: a"].tolist() == [[250.0, 300.0], [999.0, 1000.0]]
+    assert rows["optical: a"].tolist() == [[450.0, 500.0], [550.0, 600.0]]
+    assert rows["eclipse of LOW"] == "eclipses"
+    day.direct = day.optical = None
+    assert figures.contacts_figure(day)[1] == ["relay", "eclipse of LOW"]
+
+
+def test_a_distribution_of_many_bends_is_drawn_at_some_of_them_from_the_first_to_the_last():
+    """Of 1201 bends every third, each from just before it, and as many points evenly between."""
+    bends = np.linspace(10.0, 1210.0, 1201)
+    given = SimpleNamespace(first_s=bends[::2], last_s=bends[::-2], cdf=lambda at: (at - 10.0) / 1200.0)
+    given.first_s = np.concatenate([bends[::2], bends[1::2]])
+    latency_s, share = figures._distribution(SimpleNamespace(latency=given))
+    assert latency_s.size <= 2 * 401 + figures._SHARES
+    assert set(bends[::3]) <= set(latency_s) and bends[1] not in latency_s
+    assert latency_s[0] == pytest.approx(10.0, rel=1e-8) and latency_s[-1] == 1210.0
+    assert share.tolist() == given.cdf(latency_s).tolist()
+    none = SimpleNamespace(first_s=NOTHING, last_s=NOTHING)
+    assert [each.size for each in figures._distribution(SimpleNamespace(latency=none))] == [0, 0]
+
+
+def test_the_volumes_of_all_ways_stand_beside_what_is_made_and_theirs_alone_is_stored(monkeypatch):
+    monkeypatch.setattr(figures, "data_volume", lambda cumulative, stored: (cumulative, stored))
+
+    def of(name):
+        kinds = ("time_s", "generated_bit", "delivered_bit", "stored_bit")
+        return SimpleNamespace(name=name, history=SimpleNamespace(**{kind: f"{name} {kind}" for kind in kinds}))
+
+    ways = [of("relay"), of("optical downlink"), of("direct downlink")]
+    cumulative, stored = figures._volume_figure(SimpleNamespace(relay=ways[0], ways=ways))
+    assert list(cumulative.items()) == [
+        ("made by the instrument", ("relay time_s", "relay generated_bit")),
+        *((way.name, (f"{way.name} time_s", f"{way.name} delivered_bit")) for way in ways),
+    ]
+    assert list(stored.items()) == [(way.name, (f"{way.name} time_s", f"{way.name} stored_bit")) for way in ways]
+
+
+@pytest.mark.parametrize("days", [1.0, 3.0])
+def test_the_map_of_a_day_takes_its_stations_from_both_tables_and_says_where_it_ends(monkeypatch, days):
+    seen = []
+    here = SimpleNamespace(latitude_rad=np.array([0.5]), longitude_rad=np.array([0.25]))
+    around = {"around_latitude_rad": np.array([0.1, 0.2]), "around_longitude_rad": np.array([0.3, 0.4])}
+    relay, *stations = (SimpleNamespace(name=name, **vars(here), **around) for name in ("HUB", "b", "a"))
+    track = SimpleNamespace(**vars(here), relay=relay, stations=stations, open={"relay": "flags"})
+    monkeypatch.setattr(figures, "ground_track", lambda *given: seen.append(given) or track)
+    monkeypatch.setattr(figures, "world_map", lambda *given: given)
+    view = SimpleNamespace(duration_s=days * figures.LONGEST_S / 2.0)
+    day = SimpleNamespace(view=view, ways="ways", operations=SimpleNamespace(downlink="radio", optical="light"))
+    places, contact, relays, shown, first_s = figures.ground_map(day)
+    assert seen == [(view, "ways", "radio", "light")]
+    assert (contact, list(relays), list(shown)) == (track.open, ["HUB"], ["b", "a"])
+    assert first_s == (figures.LONGEST_S if days > 2.0 else None)
+    assert [places.latitude_rad[0], places.longitude_rad[0]] == [0.5, 0.25]
+    assert shown["a"].outline.longitude_rad.tolist() == [0.3, 0.4]
+    view.duration_s, track.relay, day.operations = figures.LONGEST_S, None, None
+    assert figures.ground_map(day)[2::2] == ({}, None)
+    assert seen[-1] == (view, "ways", None, None)

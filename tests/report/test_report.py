@@ -1658,7 +1658,7 @@ def test_a_table_that_the_study_has_no_use_for_is_named(contact, day, pattern, p
     assert [each.partition(":")[0] for each in words._not_run(of)] == [each for each in said if "contact" not in each]
 
 
-# ------------------------------------------------------------------------- what contributes most, of several each unlike
+# ------------------------------------------------------------------------ what contributes most, of several each unlike
 def of_requirement(subject, limited_by="x", **changes):
     return replace(Requirement(subject, subject, "rad", 1e-5, 2e-5, -1e-5, limited_by), **changes)
 
@@ -1876,3 +1876,45 @@ def test_a_contact_has_one_rate_unless_it_is_stepped_with_range(monkeypatch, rat
         assert page._contact(of, ns(operations=lacking, data=day.data)) is None
     assert page._contact(ns(contact=None, fine_pointing=of.fine_pointing), day) is None
     assert page._contact(ns(contact="run", fine_pointing=None), day) is None
+
+
+def test_the_chain_of_a_fine_loop_has_its_disturbances_of_all_axes_its_residual_and_its_worst_stroke(monkeypatch):
+    """Two axes of one and two disturbances: 3, 4 and 12 µrad."""
+    monkeypatch.setattr(chain, "output_amplitude", lambda model, half_v: 1e-4 * half_v)
+    monkeypatch.setattr(chain, "with_sign", lambda text, sources, name: f"{text} <{name}>")
+    monkeypatch.setattr(chain, "Scene", SimpleNamespace)
+    disturbances = ([ns(rms_rad=3e-6)], [ns(rms_rad=4e-6), ns(rms_rad=12e-6)])
+    strokes = [
+        ns(name="x", margin_rad=2e-4, needed_rad=3e-4, available_rad=5e-4),
+        ns(name="y", margin_rad=-1e-4, needed_rad=4e-4, available_rad=3e-4),
+    ]
+    design = ns(name="LQG", loop_margins=ns(modulus=0.5, bandwidth_hz=321.0))
+    simulated = {Variant.STRAIGHT: ns(quantile_rad=1e-6), Variant.GIVEN: ns(quantile_rad=7.5e-6)}
+    fine = ns(
+        best=ns(design=design, simulated=simulated),
+        quantile=0.997,
+        scene=ns(loop=ns(disturbances=disturbances, timing=ns(period_s=1e-4)), own_stroke=strokes),
+    )
+    judged = (("cone", "PASS"), ("stroke", "FAIL"), ("fine pointing", "PASS"), ("residual", "FAIL"))
+    of = chain_study(
+        fine_pointing=fine,
+        fine_case=object(),
+        requirements=[ns(subject=subject, mark=mark, met=mark == "PASS") for subject, mark in judged],
+    )
+    boxes = {box.name: (list(box.lines), box.mark) for box in chain.stages(of)}
+    assert boxes["Pointing"][0][2:] == ["disturbed by 13 µrad rms", "fine: 9 µrad allowed"]
+    lines, mark = boxes["Mirror"]
+    assert (lines[0], lines[-2:], mark) == (
+        "reach 1.2 mrad over 12 V",
+        ["stroke (y): 400 µrad needed,", "300 µrad available <fine_pointing.stroke.x.available_rad>"],
+        "FAIL",
+    )
+    assert boxes["Residual"] == (
+        [
+            "7.50 µrad <fine_pointing.simulated.given.quantile_rad> at 99.7 %, vibration",
+            "(12.1 µrad peak, 25 Hz sine)",
+            "allowed 9 µrad",
+        ],
+        "FAIL",
+    )
+    assert boxes["Verdict"][0][:2] == ["2 of 4 requirements met", "link at the outage −1.12 dB <margin_db.judged>,"]

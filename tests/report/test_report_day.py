@@ -1963,3 +1963,64 @@ def test_shares_and_ratios_of_a_day_have_no_power_of_ten():
     run = SimpleNamespace(windows=[window], contact=SimpleNamespace(start_s=0.0))
     assert windows_table(run, 0.997).rows[0][-1] == "100 %"
     assert day_words.ratio_text(SimpleNamespace(ratio=12345.0, direct_bit=1.0)) == "12300"
+
+
+# ----------------------------------------------------------------------------------------- more than two, out of order
+def test_a_contact_that_never_comes_to_data_ends_by_the_last_of_its_causes():
+    log = [SimpleNamespace(cause=cause) for cause in ("the rise", "no beacon", "the set")]
+    assert contact_sentences(run_of(data_s=0.0, log=log), 3, "PI", None) == [
+        "Contact 3 of 10 min never comes to data: the set."
+    ]
+
+
+def test_the_satellites_that_are_served_least_and_most_stand_anywhere_among_the_others():
+    of = SimpleNamespace(
+        served_s=np.array([120.0, 60.0, 300.0, 240.0]),
+        longest_gap_s=np.array([3600.0, 7200.0, 1800.0, 5400.0]),
+        busy_s=np.array([3600.0, 7200.0, 3600.0, 0.0]),
+    )
+    first, second, *_ = plan_sentences(rich_plan(satellites=("a", "b", "c", "d"), by_satellite=of))
+    assert second == (
+        f"A satellite has data for {duration(60.0)} to {duration(300.0)}, and waits {duration(7200.0)} at most. "
+        "Terminals in use: east 25 %, west 50 %."
+    )
+    assert first.startswith("4 satellites share 2 relays of 3 terminals each and 2 ground stations of 5 terminals in")
+    assert "6 sessions take 4 h and carry" in first
+
+
+def test_at_most_three_of_four_assumptions_that_move_the_relay_are_named_the_weightiest_first():
+    swings = [swing_of(name=name, of_relay=of) for name, of in (("a", 1.2), ("b", 3.0), ("c", 1.05), ("d", 2.0))]
+    swings.append(swing_of(name="e", of_relay=1.5))
+    day = replace_namespace(day_of(None, None), swings=swings)
+    assert day_words.assumption_words(day) == [
+        "What matters most to the relay's volume, each assumption changed alone: b (l: 1 GB, h: 1 GB); d (l: 1 GB, "
+        "h: 1 GB); e (l: 1 GB, h: 1 GB)."
+    ]
+
+
+def test_both_satellites_are_named_where_they_never_meet():
+    pair = SimpleNamespace(leo=SimpleNamespace(name="LOW"), geo=SimpleNamespace(name="HUB"))
+    day = SimpleNamespace(view=SimpleNamespace(encounters=(), pair=pair))
+    assert day_words.contact_words(day) == (
+        "There is no contact: within the span and the limits of the mission, LOW and HUB do not see one another."
+    )
+
+
+@pytest.mark.parametrize("direct", [True, False])
+def test_a_file_of_contacts_has_the_optical_passes_where_there_is_no_other_downlink(monkeypatch, direct):
+    """A station's name that a spreadsheet would compute is made text; rows stand by their rise."""
+    monkeypatch.setattr(day_data_file.words, "sentences", lambda day: [])
+    day = rich_day() if direct else rich_day(direct=None)
+    rows = list(csv.DictReader(io.StringIO(day_data_file.day_csv(day))))
+    found = [(row["by"], row["with"], float(row["rise (s)"]), row["largest range (m)"] != "") for row in rows]
+    ground = [("direct downlink", "a", 500.0, False), ("direct downlink", "b", 7300.0, False)] if direct else []
+    assert found == sorted(
+        [
+            ("relay", "HUB", 600.0, True),
+            ("relay", "HUB", 7200.0, True),
+            ("optical downlink", "'=c", 2000.0, False),
+            ("optical downlink", "a", 9000.0, False),
+            *ground,
+        ],
+        key=lambda row: row[2],
+    )

@@ -1529,3 +1529,31 @@ def test_what_is_compared_to_the_last_bit_depends_on_the_machine_and_not_on_what
     data = reproduction_data(outcome(unlike=unlike, differences=differences))
     assert data["same"] == (not differences)
     assert data["compared"] == ("to stated tolerances" if unlike else "to the last bit")
+
+
+@pytest.mark.parametrize("name", ["manifest.JSON", "my.Json"])
+def test_a_manifest_is_told_from_a_page_whatever_the_case_of_its_ending(tmp_path, name):
+    path = tmp_path / name
+    path.write_text(json.dumps(held()), encoding="utf-8")
+    found = manifest_reader.read_manifest(path)
+    assert (found.data, found.page, found.path) == (held(), "", path)
+
+
+def test_what_is_altered_of_mission_mirror_and_named_files_is_told_of_each_by_its_own_hash(tmp_path):
+    """Two of four texts were changed; the same text stands in two of them."""
+
+    def entry(text, stated=None):
+        digest = hashlib.sha256((text if stated is None else stated).encode()).hexdigest()
+        return {"file": "a", "sha256": "0" * 64, "text": text, "text_sha256": digest}
+
+    inputs = {"same.csv": "m", "other.csv": "changed", "unstated.csv": "u"}
+    hashes = {"other.csv": entry("o")["text_sha256"], "same.csv": entry("m")["text_sha256"], "gone.csv": "0" * 64}
+    data = held(mission=entry("m"), mirror=entry("mirror", "another"), inputs=inputs, inputs_sha256=hashes)
+    found = manifest_reader.altered_parts(manifest_reader.ReadManifest(tmp_path / "m.json", data, ""))
+    own = {text: hashlib.sha256(text.encode()).hexdigest()[:16] for text in ("mirror", "changed", "another", "o", "u")}
+    end = "was changed after the report was written: its SHA-256 is"
+    assert found == (
+        f"the mirror file's text {end} {own['mirror']}…, and {own['another']}… is stated",
+        f"the text of other.csv {end} {own['changed']}…, and {own['o']}… is stated",
+        f"the text of unstated.csv {end} {own['u']}…, and … is stated",
+    )
