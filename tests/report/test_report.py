@@ -1918,3 +1918,71 @@ def test_the_chain_of_a_fine_loop_has_its_disturbances_of_all_axes_its_residual_
         "FAIL",
     )
     assert boxes["Verdict"][0][:2] == ["2 of 4 requirements met", "link at the outage −1.12 dB <margin_db.judged>,"]
+
+
+def a_claim(where, agrees="yes"):
+    return ns(where=where, claim=f"claim of {where}", ours="ours", agrees=agrees, why="why")
+
+
+def test_the_claims_of_a_figure_are_those_that_name_its_number_behind_the_word():
+    places = ("section 5, Fig. 8", "Fig. 6, 8", "Fig. 18", "section 8", "Table 8", "Fig. 5 and 6", "section 6, Fig. 4")
+    of = ns(claims=[a_claim(where) for where in places])
+
+    def told(number):
+        table = paper_views._claims_of(of, number)
+        return None if table is None else [row[0] for row in table.rows]
+
+    assert told("Fig. 8") == ["section 5, Fig. 8", "Fig. 6, 8"]
+    assert told("Fig. 5") == ["Fig. 5 and 6"]
+    assert told("Fig. 6") == ["Fig. 6, 8", "Fig. 5 and 6"]
+    assert told("Fig. 1") is None
+
+
+def test_the_claims_are_counted_by_whether_they_agree_the_most_first_and_each_change_is_named(monkeypatch):
+    changed = [("a.b", '"6 cm"', '"5 cm"'), ("c.d", '"2 W"', '"5 W"')]
+    monkeypatch.setattr(paper_views, "changed_from_shipped", lambda sources: changed)
+    agrees = ("no", "yes", "inferred", "yes", "no", "yes")
+    of = ns(claims=[a_claim(f"Fig. {k}", each) for k, each in enumerate(agrees)], file=ns(sources={}))
+    view = paper_views.claims_view(of)
+    (table,) = (block for block in view.blocks if isinstance(block, Table))
+    assert table.folded == "6 claims; whether they agree: 3 yes, 2 no, 1 inferred"
+    assert [str(cell) for cell in table.rows[2]] == ["Fig. 2", "claim of Fig. 2", "ours", "inferred", "why"]
+    assert 'This mission is not the paper\'s: a.b is "6 cm", there "5 cm"; c.d is "2 W", there "5 W".' in view.blocks
+
+
+@pytest.mark.parametrize(("left", "said"), [(1.5, None), (1.51, "1.51"), (0.5, None)])
+def test_a_loop_that_leaves_more_than_half_as_much_again_as_its_theory_is_warned_of(left, said):
+    def of(fine=True, table=True, with_loop=True):
+        best = ns(
+            design=ns(name="LQG"),
+            simulated={Variant.STRAIGHT: ns(rms_rad=9e-6), Variant.GIVEN: ns(rms_rad=left * 2.0**-18)},
+            theory=ns(radial_rms_rad=2.0**-18),
+        )
+        mission = ns(error_budget=ns(with_loop=with_loop) if table else None)
+        return ns(fine_pointing=ns(best=best) if fine else None, file=ns(mission=mission))
+
+    found = words._of_budget_loop(of())
+    text = f"the error budget takes the loop by its linear theory; simulated, it leaves {said} times as much rms"
+    assert [(each.text, each.about, each.cost_db) for each in found] == ([(text, "error budget", 0.0)] if said else [])
+    (told,) = words.loop_in_budget(of())
+    assert told.startswith("In all, LQG leaves 3.81 µrad rms by that theory, and ")
+    for lacking in ({"fine": False}, {"table": False}, {"with_loop": False}):
+        assert words._of_budget_loop(of(**lacking)) == words.loop_in_budget(of(**lacking)) == []
+
+
+def test_the_requirement_nearest_to_its_limit_is_told_as_met_missed_or_unknown(monkeypatch):
+    monkeypatch.setattr(words.contributors, "contributor", lambda study, r: f"most of {r.name}")
+    monkeypatch.setattr(words.contributors, "advice", lambda study, r: f"; mend {r.name}")
+    near = Requirement("beacon", "beacon margin", "dB", 3.0, 3.5, 0.5, "width")
+    far = Requirement("answer", "answer margin", "dB", 3.0, 9.0, 6.0, "width")
+    assert words._limit(words_study(requirements=(far, near))) == (
+        "Nearest to its limit is the beacon margin. Most of beacon margin; mend beacon margin."
+    )
+    missed = replace(far, actual=2.0, margin=-1.0)
+    assert words._limit(words_study(requirements=(near, missed))) == (
+        "What limits it is the answer margin. Most of answer margin; mend answer margin."
+    )
+    unknown = replace(near, unknown="the receiver's noise")
+    assert words._limit(words_study(requirements=(far, unknown))) == (
+        "Nothing can be said of the beacon margin: the receiver's noise."
+    )

@@ -3015,3 +3015,17 @@ def test_axes_of_a_region_tell_their_inputs_from_those_that_are_not_drawn():
     )
     (panel,) = drawing.region(summary, TWO_SIDES[1], 0, [keys[0], keys[2]]).sheet.panels
     assert [panel.x.title, panel.y.title] == ["first.axis.gain", "plant.alpha"]
+
+
+@pytest.mark.parametrize("lacking", ["outputs", "missed_by", "sample"])
+def test_a_region_is_of_a_limit_and_a_combination_of_which_all_is_known(lacking):
+    """The first combination has no share of the rows that miss the second limit, or not its output, or none has it."""
+    summary = two_cells()
+    first, second = summary.cells
+    if lacking == "sample":
+        sample = {key: column for key, column in summary.sample.items() if key != "residual_quantile"}
+        assert campaign_module._split(replace(summary, sample=sample)) == (TWO_SIDES[1], 1)
+        return
+    kept = {key: each for key, each in getattr(first, lacking).items() if key != "margin"}
+    cells = (replace(first, **{lacking: kept}), replace(second, missed_by={"margin": between_ends(0.25)}))
+    assert campaign_module._split(replace(summary, cells=cells)) == (TWO_SIDES[1], 1)

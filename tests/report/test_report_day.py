@@ -2024,3 +2024,108 @@ def test_a_file_of_contacts_has_the_optical_passes_where_there_is_no_other_downl
         ],
         key=lambda row: row[2],
     )
+
+
+# ------------------------------------------------------------------ arrays of controllers that do not have all the same
+def test_arrays_of_residuals_are_nan_where_a_controller_did_not_run_on_a_mirror_and_0_where_it_met_no_limit():
+    """The second of two controllers has a mirror that the first has not, and lacks one of its two."""
+
+    def of(k, shares):
+        numbers = {"rms_rad": k, "rms_interval_rad": k / 10.0, "quantile_rad": 3.0 * k, "largest_rad": 5.0 * k}
+        return SimpleNamespace(**numbers, axis_rms_rad=[k / 2.0, k / 4.0], shares=shares)
+
+    first, *_, last = limits = [*arrays.COUNTERS]
+    verified = [
+        SimpleNamespace(design=SimpleNamespace(name="PI"), simulated={"b": of(1.0, {last: 0.5}), "a": of(2.0, {})}),
+        SimpleNamespace(design=SimpleNamespace(name="LQG"), simulated={"c": of(4.0, {first: 0.25}), "b": of(8.0, {})}),
+    ]
+    fine = SimpleNamespace(
+        verified=verified,
+        quantile=0.99,
+        best=verified[1],
+        scene=SimpleNamespace(loop=SimpleNamespace(axes=2)),
+    )
+    group = arrays._residuals(fine)
+    found = {name: values for name, (*_, values) in arrays_of(group).items()}
+    assert [found[name] for name in ("controller", "mirror", "axis", "limit")] == [
+        ["PI", "LQG"],
+        ["b", "a", "c"],
+        ["x", "y"],
+        limits,
+    ]
+    assert found["rms"] == [[1.0, 2.0, "nan"], [8.0, "nan", 4.0]]
+    assert found["rms_interval"] == [[0.1, 0.2, "nan"], [0.8, "nan", 0.4]]
+    assert found["quantile"] == [[3.0, 6.0, "nan"], [24.0, "nan", 12.0]]
+    assert found["largest"] == [[5.0, 10.0, "nan"], [40.0, "nan", 20.0]]
+    assert found["axis_rms"] == [[[0.5, 0.25], [1.0, 0.5], ["nan"] * 2], [[4.0, 2.0], ["nan"] * 2, [2.0, 1.0]]]
+    none, zeros = ["nan"] * len(limits), [0.0] * len(limits)
+    assert found["share"] == [
+        [[*zeros[1:], 0.5], zeros, none],
+        [zeros, none, [0.25, *zeros[1:]]],
+    ]
+    assert group.attributes == {"quantile": 0.99, "best": "LQG"}
+
+
+def test_arrays_of_the_theory_are_nan_for_a_source_that_a_controller_does_not_have(monkeypatch):
+    parts = {"PI": {"noise": 1.0, "OLYMPUS": 2.0}, "LQG": {"OLYMPUS": 4.0, "gauge": 8.0}}
+    monkeypatch.setattr(arrays, "sources", lambda verified: ["OLYMPUS", "gauge", "noise"])
+    monkeypatch.setattr(arrays, "rms_by_source", lambda each: parts[each.design.name])
+    verified = [
+        SimpleNamespace(design=SimpleNamespace(name=name), theory=SimpleNamespace(radial_rms_rad=10.0 * (k + 1)))
+        for k, name in enumerate(parts)
+    ]
+    found = arrays_of(arrays._theory(SimpleNamespace(verified=verified, optimum_rad=0.5)))
+    assert {name: values for name, (*_, values) in found.items()} == {
+        "controller": ["PI", "LQG"],
+        "source": ["OLYMPUS", "gauge", "noise"],
+        "rms_by_source": [[2.0, "nan", 1.0], [4.0, 8.0, "nan"]],
+        "rms": [10.0, 20.0],
+        "bound": 0.5,
+    }
+
+
+def test_a_loop_and_a_trace_have_each_curve_about_the_bias_that_is_its_own():
+    loop = SimpleNamespace(
+        freq_hz=0.5, drive_v=np.array([-1.0, 2.0]), output_rad=np.array([3.0, 4.0]),
+        hysteresis_rad=np.array([5.0, 6.0]), width=0.25, clamped=7,
+    )  # fmt: skip
+    other = SimpleNamespace(**vars(loop) | {"freq_hz": 80.0, "drive_v": np.array([0.0, 1.0]), "clamped": 0})
+    file = SimpleNamespace(mission=SimpleNamespace(mirror=SimpleNamespace(bias_v=6.0)))
+    found = arrays._loops(SimpleNamespace(file=file, loops=[loop, other]))
+    assert list(found) == ["hysteresis_loops/0.5_hz", "hysteresis_loops/80_hz"]
+    first, second = ({name: values for name, (*_, values) in arrays_of(each).items()} for each in found.values())
+    assert first == {"drive": [5.0, 8.0], "output": [3.0, 4.0], "hysteresis": [5.0, 6.0]}
+    assert second["drive"] == [6.0, 7.0]
+    assert found["hysteresis_loops/0.5_hz"].attributes == {
+        "frequency_hz": 0.5, "width": 0.25, "rate_clamped_samples": 7,
+    }  # fmt: skip
+    curves = {
+        f"{name}": np.array([[k + 0.25, 99.0], [k + 0.5, 99.0], [k + 0.75, 99.0]])
+        for k, name in enumerate(("reference_rad", "output_rad", "command_v", "drive_v"))
+    }
+    kinds = ("clamped", "inverse_clamped", "saturated", "slew_limited", "alternating")
+    trace = SimpleNamespace(
+        **curves, time_s=np.array([0.0, 0.1, 0.2]), peak_rad=1.5, rms_rad=1.25, steady=slice(2, None),
+        counts=SimpleNamespace(**{name: k + 1 for k, name in enumerate(kinds)}),
+    )  # fmt: skip
+    group = arrays._trace(SimpleNamespace(trace=trace, mirror="given", controller="PID + inverse", freq_hz=25.0))
+    assert {name: values for name, (*_, values) in arrays_of(group).items()} == {
+        "time": [0.0, 0.1, 0.2],
+        "reference": [0.25, 0.5, 0.75],
+        "output": [1.25, 1.5, 1.75],
+        "command": [2.25, 2.5, 2.75],
+        "drive": [3.25, 3.5, 3.75],
+    }
+    assert group.attributes == {
+        "mirror": "given",
+        "controller": "PID + inverse",
+        "frequency_hz": 25.0,
+        "peak_error_rad": 1.5,
+        "rms_error_rad": 1.25,
+        "steady_from_sample": 2,
+        "rate_clamped_steps": 1,
+        "rate_clamped_inverse_samples": 2,
+        "saturated_samples": 3,
+        "slew_limited_steps": 4,
+        "alternating_samples": 5,
+    }
