@@ -1557,3 +1557,69 @@ def test_what_is_altered_of_mission_mirror_and_named_files_is_told_of_each_by_it
         f"the text of other.csv {end} {own['changed']}…, and {own['o']}… is stated",
         f"the text of unstated.csv {end} {own['u']}…, and … is stated",
     )
+
+
+STEPS = tolerances.ConverterSteps(1e-8, 4, 1e-5, 4e-6, 5e-6, 0.01, 0.005, 3e8, 1000, 10)
+
+
+@pytest.mark.parametrize(
+    ("place", "unit", "allowed"),
+    [
+        ("links.budgets[0].lines[2].value", "dB", 1e-8),  # the unit beside it
+        ("links.budgets[0].lines[2].value", "", 1e-12),
+        ("links.finding.spread_rad", "dB", 1e-12),  # that of its key comes first
+        ("contact.windows[3].rms_rad", "", 2e-8),
+        ("nowhere.rms_rad", "dB", 0.0),
+    ],
+)
+def test_a_number_near_0_may_move_by_the_distance_of_its_own_unit_or_the_one_beside_it(place, unit, allowed):
+    assert reproduce.of_summary(STEPS)(place, unit, 0.0, 0.0) == pytest.approx(allowed, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "elsewhere", "same"),
+    [
+        ("tornado", 1.8e-8, True, True),  # a formula's 1e-8, and 1e-8 for nine digits
+        ("tornado", 2.2e-8, True, False),
+        ("tornado", 1e-9, False, False),
+        ("claims-scan", 0.8e-8, True, True),
+        ("claims-scan", 1.2e-8, True, False),
+        ("of-no-kind", 0.8e-8, True, True),
+        ("of-no-kind", 1.2e-8, True, False),
+    ],
+)
+def test_the_data_of_a_figure_may_move_by_its_kind_and_its_digits(tmp_path, name, share, elsewhere, same):
+    """The second of two columns moves; a table that another machine wrote has other line ends."""
+    file = f"figures/{name}.csv"
+    for folder, text in (("was", "a,b (W)\r\n1,2\r\n3,4\r\n"), ("now", f"a,b (W)\n1,2\n3,{4.0 * (1.0 + share)!r}\n")):
+        (tmp_path / folder / "figures").mkdir(parents=True)
+        (tmp_path / folder / file).write_bytes(text.encode())
+    was = manifest_reader.ReadManifest(tmp_path / "was" / "report.html", held(), "")
+    again = reproduce.Again({}, "", tmp_path / "now", STEPS)
+    found = reproduce._of_tables(was, again, file, elsewhere)
+    assert found.numbers == 4
+    assert [each.place for each in found.differences] == ([] if same else [f"{file}: b (W), row 2"])
+
+
+@pytest.mark.parametrize(
+    ("name", "here", "there", "elsewhere", "read"),
+    [
+        ("tornado", True, True, True, True),
+        ("tornado", True, True, False, True),
+        ("tornado", False, True, False, False),
+        ("tornado", True, False, False, False),
+        ("latency", True, True, True, False),  # a curve has points of its own on each machine
+        ("latency", True, True, False, True),
+    ],
+)
+def test_the_data_of_a_figure_are_compared_where_both_are_at_hand_in_the_same_rows(
+    tmp_path, name, here, there, elsewhere, read
+):
+    file = f"figures/{name}.csv"
+    for folder, made in (("was", there), ("now", here)):
+        (tmp_path / folder / "figures").mkdir(parents=True)
+        if made:
+            (tmp_path / folder / file).write_text("a\n1\n", encoding="utf-8")
+    was = manifest_reader.ReadManifest(tmp_path / "was" / "report.html", held(), "")
+    again = reproduce.Again({}, "", tmp_path / "now", STEPS)
+    assert reproduce._comparable(was, again, file, elsewhere) is read
