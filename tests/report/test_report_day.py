@@ -2129,3 +2129,44 @@ def test_a_loop_and_a_trace_have_each_curve_about_the_bias_that_is_its_own():
         "slew_limited_steps": 4,
         "alternating_samples": 5,
     }
+
+
+@pytest.mark.parametrize(
+    ("share", "relays", "said"),
+    [
+        (1.0, 0, "the relay is never in view"),
+        (0.75, 0, "the relay never grants the link"),
+        (0.75, 3, "the relay grants the link 3 times, 90 min in all"),
+        (1.0, 3, "the relay is in view 3 times, 90 min in all"),
+        (None, 3, "the relay is in view 3 times, 90 min in all"),
+    ],
+)
+def test_a_relay_of_a_share_of_the_time_grants_its_link_and_others_are_in_view(share, relays, said):
+    """The ground, which stands beside it, is in view in either case."""
+    down = SimpleNamespace(stations=("b", "a"))
+    operations = None if share is None else SimpleNamespace(relay_share=share, downlink=down, optical=None, runs=1)
+    direct = a_way(contacts=range(2), contact_s=600.0, capacity_bit=4e12)
+    day = a_day(relay=a_way(contacts=range(relays)), direct=direct, operations=operations, ratio=2.0)
+    stations = "" if share is None else "b, a"
+    (found,) = day_words.headline(day)
+    assert found == (
+        f"In {duration(86400.0)} {said}, and could carry 1 TB. The ground ({stations}) is in view 2 times, 10 min in "
+        "all, and could carry 500 GB; the relay could carry 2 times as much."
+    )
+
+
+@pytest.mark.parametrize(
+    ("least_bit", "most_bit", "runs", "spread"),
+    [(4e12, 8e12, 5, ", from 500 GB to 1 TB by the weather drawn"), (8e12, 8e12, 1, "")],
+)
+def test_the_optical_downlink_tells_how_far_the_weather_parts_its_volumes(least_bit, most_bit, runs, spread):
+    way = a_way(capacity_bit=7.2e12, capacity_spread_bit=(least_bit, most_bit))
+    optical = SimpleNamespace(stations=("y", "x", "z"))
+    of = SimpleNamespace(relay_share=1.0, downlink=None, optical=optical, runs=runs)
+    day = a_day(operations=of, view=SimpleNamespace(days=3.0, duration_s=259200.0, partner="relay"))
+    assert day_words._optical_words(day, way) == (
+        "Optical ground stations (y, x, z) are in use for 90 min (30 min a day), and could carry 900 GB (300 GB a day)"
+        f"{spread}"
+    )
+    never = day_words._optical_words(day, a_way(contacts=()))
+    assert never == "Optical ground stations (y, x, z) are never used"
