@@ -1986,3 +1986,47 @@ def test_the_requirement_nearest_to_its_limit_is_told_as_met_missed_or_unknown(m
     assert words._limit(words_study(requirements=(far, unknown))) == (
         "Nothing can be said of the beacon margin: the receiver's noise."
     )
+
+
+def test_what_is_told_in_short_leaves_out_what_there_is_nothing_of(monkeypatch):
+    """A drive beyond what is known of the mirror stands in the place of the weightiest warning."""
+    monkeypatch.setattr(words, "limits", lambda study: ["margin", "limit"])
+    monkeypatch.setattr(words, "warnings", lambda study: ["first", "second"])
+    monkeypatch.setattr(words, "_papers_loop", lambda study: "loop" if study.day else "")
+    monkeypatch.setattr(words.day_words, "headline", lambda day: [f"headline of {day}", "more"])
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: "far")
+    loop = words_study()
+    assert words.short(loop) == ["margin", "limit", "Not to be relied on: far."]
+    fine = words_study(fine_case=ns(controller="LQG"), day="a day")
+    assert words.short(fine) == [
+        "margin",
+        "limit",
+        "Warning 1 of 2 (all by --verbose): first.",
+        "headline of a day",
+        "loop",
+    ]
+    monkeypatch.setattr(words, "warnings", lambda study: [])
+    assert words.short(fine) == ["margin", "limit", "headline of a day", "loop"]
+
+
+@pytest.mark.parametrize(
+    ("met", "fine", "beyond", "good"),
+    [
+        (True, True, "far", True),
+        (True, False, "far", False),
+        (True, False, "", True),
+        (False, True, "", False),
+    ],
+)
+def test_a_verdict_is_good_where_all_is_met_and_the_judged_mirror_is_known(monkeypatch, met, fine, beyond, good):
+    monkeypatch.setattr(words, "headline", lambda study: "a headline")
+    monkeypatch.setattr(words.contributors, "judged_table", lambda study, found: f"table of {len(found)}")
+    monkeypatch.setattr(words, "beyond_identified", lambda study, run: beyond if run is study.residual else "")
+    derived = replace(words_study().requirements[1], derived=("a.b = 3 dB: from the margin",))
+    of = words_study(met=met, fine_case=object() if fine else None, requirements=(derived, derived))
+    box = words.verdict_box(of)
+    assert (box.headline, box.good) == ("a headline", good)
+    assert list(box.blocks) == [
+        "table of 2",
+        "Derived, so that meeting it proves nothing: a.b = 3 dB: from the margin.",
+    ]

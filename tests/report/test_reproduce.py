@@ -1623,3 +1623,50 @@ def test_the_data_of_a_figure_are_compared_where_both_are_at_hand_in_the_same_ro
     was = manifest_reader.ReadManifest(tmp_path / "was" / "report.html", held(), "")
     again = reproduce.Again({}, "", tmp_path / "now", STEPS)
     assert reproduce._comparable(was, again, file, elsewhere) is read
+
+
+def test_a_mission_that_does_not_run_is_refused_by_the_name_that_was_given(tmp_path, monkeypatch):
+    def fails(file, on_progress):
+        raise ValueError("its loop is unstable")
+
+    monkeypatch.setattr(reproduce, "read_manifest", lambda path: manifest_reader.ReadManifest(path / "m", held(), ""))
+    monkeypatch.setattr(reproduce, "unpack_mission", lambda manifest, folder: (None, {}))
+    monkeypatch.setattr(reproduce.study, "run_study", fails)
+    with pytest.raises(reproduce.ReproduceError) as refused:
+        reproduce.reproduce(tmp_path)
+    assert str(refused.value) == f"{tmp_path}: the mission that it carries does not run: its loop is unstable"
+
+
+def test_what_is_run_again_is_compared_with_the_names_that_the_mission_gives_in_page_and_manifest(
+    tmp_path, monkeypatch
+):
+    """Two files that the mission names stand under other names in the folder where it is run."""
+    told, was = [], manifest_reader.ReadManifest(tmp_path / "r.html", held(), "page")
+    moved = {'a&"b".csv': "named-file-0.csv", "../c.csv": "named-file-1.csv"}
+
+    def write(ran, folder, on_progress):
+        folder.mkdir(parents=True)
+        (folder / "manifest.json").write_text('{"0": "named-file-0.csv", "1": "named-file-1.csv"}', encoding="utf-8")
+        (folder / "report.html").write_text("named-file-1.csv, named-file-0.csv", encoding="utf-8")
+        on_progress(2, 2, f"written of {ran}")
+        return folder / "report.html"
+
+    def unpacked(manifest, folder):
+        told.append((manifest, folder.name))
+        return "mission", moved
+
+    monkeypatch.setattr(reproduce, "read_manifest", lambda path: was)
+    monkeypatch.setattr(reproduce, "unpack_mission", unpacked)
+    monkeypatch.setattr(
+        reproduce.study, "run_study", lambda file, on_progress: on_progress(1, 2, f"ran {file}") or "a study"
+    )
+    monkeypatch.setattr(reproduce.report, "write", write)
+    monkeypatch.setattr(reproduce, "converter_steps", lambda ran: f"steps of {ran}")
+    monkeypatch.setattr(reproduce, "_compared", lambda manifest, again: (manifest, again))
+    manifest_was, again = reproduce.reproduce(tmp_path / "r.html", lambda *progress: told.append(progress))
+    assert manifest_was is was
+    assert again.manifest == {"0": 'a&"b".csv', "1": "../c.csv"}
+    assert again.page == "../c.csv, a&amp;&#34;b&#34;.csv"
+    assert (again.folder.name, again.steps) == ("again", "steps of a study")
+    assert told == [(was, "study"), (1, 2, "ran mission"), (2, 2, "written of a study")]
+    assert not again.folder.exists()
