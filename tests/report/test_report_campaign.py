@@ -3029,3 +3029,20 @@ def test_a_region_is_of_a_limit_and_a_combination_of_which_all_is_known(lacking)
     kept = {key: each for key, each in getattr(first, lacking).items() if key != "margin"}
     cells = (replace(first, **{lacking: kept}), replace(second, missed_by={"margin": between_ends(0.25)}))
     assert campaign_module._split(replace(summary, cells=cells)) == (TWO_SIDES[1], 1)
+
+
+def test_two_findings_and_two_warnings_stand_in_text_page_and_data_each_in_its_place():
+    summary = two_cells(findings=("one finding", "another finding"), warnings=("first doubt", "second doubt"))
+    lines = campaign_text(summary, 100).splitlines()
+    at = lines.index("one finding")
+    assert lines[at - 1 : at + 3] == ["", "one finding", "another finding", ""]
+    assert lines[-3:] == [
+        "Warning: first doubt",
+        "Warning: second doubt",
+        "Running: 41 of 64 rows, 2.05 rows a second, 5 min left.",
+    ]
+    page, data = campaign_page(summary), campaign_data(summary)
+    words = ("one finding", "another finding", "first doubt", "second doubt")
+    places = [page.index(each) for each in words]
+    assert places == sorted(places) and [page.count(each) for each in words] == [1] * 4
+    assert (data["findings"], data["warnings"]) == ([*words[:2]], [*words[2:]])
