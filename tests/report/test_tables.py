@@ -230,3 +230,27 @@ def test_a_name_that_the_report_has_not_is_said_to_be_missing():
     with pytest.raises(AttributeError, match=r"module 'microrad\.report' has no attribute 'nothing'"):
         _ = report.nothing
     assert {name for name in report.__all__ if not callable(getattr(report, name))} == set()
+
+
+@pytest.mark.parametrize(
+    ("width", "widths"), [(28, [22, 1]), (25, [19, 1]), (22, [16, 1]), (21, [16, 1]), (10, [16, 1]), (0, [16, 1])]
+)
+def test_a_word_of_more_than_sixteen_letters_is_folded_and_no_column_is_narrower_than_its_least(width, widths):
+    word = "abcdefghijklmnopqrstuv"
+    table = Table("", ("name", "x"), [(word, "7")], (0,))
+    assert table.widths(width) == widths
+    if width == 22:
+        lines = [line.split() for line in table_text(table, width).splitlines()]
+        assert lines[2:] == [[word[:16], "7"], [word[16:]]]
+
+
+def test_the_first_column_stands_beside_each_other_one_however_little_room_there_is():
+    headings = ("station", "rise", "set")
+    table = Table("Contacts", headings, [("s" * 14, "1" * 12, "2" * 12)], (0,), totals=1)
+    parts = table.parts(20)
+    assert [list(each.headings) for each in parts] == [["station", "rise"], ["station", "set"]]
+    assert [(each.title, each.totals) for each in parts] == [("Contacts", 1), ("", 1)]
+    assert [list(each.headings) for each in table.parts(46)] == [["station", "rise", "set"]]  # 14 + 12 + 12 and gaps
+    assert [list(each.headings) for each in Table("", headings[:2], [("a" * 9, "1" * 40)]).parts(20)] == [
+        ["station", "rise"]
+    ]
