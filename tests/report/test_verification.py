@@ -3215,3 +3215,40 @@ def test_contacts_without_lock_may_differ_by_five_standard_errors_of_all_that_is
     assert [(each.expected, each.obtained) for each in found] == [(0.75, 0.8), (0.75, 0.7)]
     variances = 0.25 * 0.75 * np.array([3 / 20, 9 / 400, 9 / operation._ACQUIRED])  # of a count of contacts
     assert [each.tolerance for each in found] == pytest.approx([5.0 * math.sqrt(variances.sum())] * 2)
+
+
+@pytest.fixture
+def far(monkeypatch):
+    """The signs of a mission whose range is ten times, and whose rate is twice the largest that was swept."""
+    held = {"domains": DOMAINS, "bare": [], "depends": {"A": ["loop.rate", "link.range"], "B": ["loop.rate"]}}
+    monkeypatch.setattr(foundation, "shipped", lambda: held)
+    monkeypatch.setattr(marks, "shipped", lambda: held)
+    monkeypatch.setattr(marks, "kind_of", lambda name: {"a": "A", "b": "B"}.get(name.rpartition(".")[2], ""))
+    return marks.Marks.of(stated(loop__rate="2 kHz", link__range="50000 km"))
+
+
+def test_a_number_on_two_inputs_beyond_tells_the_farther_first_and_the_legend_what_came_first(far):
+    rate = (
+        "loop.rate = 2 kHz is 2 times the largest at which loops were held against independent methods, 1 kHz."
+        " Figures that depend on it are extrapolated."
+    )
+    length = (
+        "link.range = 50000 km is 10 times the largest at which links were held against independent methods, 5000 km."
+        " Figures that depend on it are extrapolated."
+    )
+    assert far.sign("z.b") == marks.Sign("†", "B", rate, ("loop.rate",))
+    assert far.sign("z.a") == marks.Sign("†", "A", f"{length} {rate}", ("link.range", "loop.rate"))
+    assert list(far.legend.lines) == [f"† {rate}", f"† {length}"]
+
+
+@pytest.mark.parametrize(
+    ("sums", "folded", "said"),
+    [
+        (("12", "3"), "-12, −12 or +12 and 12", "-12, −12 or +12 and 12 †"),
+        (("12", "12"), "12 and 12 % of 120", "12 † and 12 † % of 120"),
+        (("3", "12"), "3 with 12, 0.3 and v3", "3 † with 12 †, 0.3 and v3"),
+    ],
+)
+def test_a_sum_in_a_fold_has_its_sign_once_and_other_numbers_that_end_like_it_have_none(far, sums, folded, said):
+    table = Table("", ("", "one", "two"), [("all", *sums)], names={1: "z.a", 2: "z.b"}, totals=1, folded=folded)
+    assert far.table(table).folded == said
