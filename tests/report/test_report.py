@@ -22,6 +22,7 @@ from microrad.link.budget.lines import FREE_SPACE_LOSS
 from microrad.link.requirement import Requirement
 from microrad.mirror import Variant
 from microrad.mission import file as missionfile
+from microrad.mission.model import Source
 from microrad.report.data import finite
 from microrad.report.page import templates as scripts
 from microrad.report.page.templates import inputs_view
@@ -2029,4 +2030,33 @@ def test_a_verdict_is_good_where_all_is_met_and_the_judged_mirror_is_known(monke
     assert list(box.blocks) == [
         "table of 2",
         "Derived, so that meeting it proves nothing: a.b = 3 dB: from the margin.",
+def test_inputs_that_are_assumed_inferred_or_changed_are_found_by_their_rows(monkeypatch):
+    """Changed is one by its value, one by a comment of another value, and one that nothing shipped has."""
+    monkeypatch.setattr("microrad.mission.file.changed_from_shipped", lambda sources: (("z.e", "5", "4"),))
+    monkeypatch.setattr("microrad.mission.origins.is_shipped", lambda key, value: (key, value) != ("z.d", "4"))
+    given = {
+        "mirror.uncertainty.correlation": Source(1, "assumption: many", "[1]"),
+        "z.a": Source(2, "assumption: a", "1"),
+        "z.b": Source(3, "derived: from a", "2"),
+        "z.c": Source(4, "assumption: of 7", "3", was="7"),
+        "z.d": Source(5, "", "4"),
+        "z.e": Source(6, "[1] Table 2", "5"),
+    }
+    view = inputs_view(given)
+    (table,) = view.blocks
+    assert (view.title, view.anchor, table.words) == ("Assumptions and inputs", "assumptions", (0, 1, 2))
+    assert dict(table.filters) == {
+        "assumptions": [0, 2],
+        "inferred from others": [1],
+        "changed from what is shipped": [2, 3, 4],
+    }
+    assert table.folded == (
+        "All 5 inputs with their sources: 2 assumptions, 1 inferred from others, 3 changed from what is shipped"
+    )
+    assert [(cell.text, cell.code, value, said) for cell, value, said in table.rows] == [
+        ("z.a", True, "1", "assumption: a"),
+        ("z.b", True, "2", "derived: from a"),
+        ("z.c", True, "3", "mission file, line 4, in place of 7 (assumption: of 7)"),
+        ("z.d", True, "4", "mission file, line 5"),
+        ("z.e", True, "5", "[1] Table 2"),
     ]

@@ -3252,3 +3252,36 @@ def test_a_number_on_two_inputs_beyond_tells_the_farther_first_and_the_legend_wh
 def test_a_sum_in_a_fold_has_its_sign_once_and_other_numbers_that_end_like_it_have_none(far, sums, folded, said):
     table = Table("", ("", "one", "two"), [("all", *sums)], names={1: "z.a", 2: "z.b"}, totals=1, folded=folded)
     assert far.table(table).folded == said
+
+
+def test_the_faster_of_two_loops_and_half_of_the_drives_range_are_held_against_recordings(monkeypatch):
+    extents = {
+        "drive": {"least": 1.0, "most": 2.0, "unit": "V"},
+        "frequency": {"least": 5.0, "most": 50.0, "unit": "Hz"},
+        "position": {"least": 1e-6, "most": 1e-6, "unit": "m"},
+        "rate": {"least": 1000.0, "most": 1000.0, "unit": "Hz"},
+    }
+    errors = [{"unit": "", "error": 0.01234, "allowed": 0.123456}]
+    record = {
+        "part": "the play",
+        "inputs": 1,
+        "errors": errors,
+        "extents": extents,
+        "frequencies": ["a.none", "a.sine"],
+    }
+    monkeypatch.setattr(foundation, "shipped", lambda: {"recordings": {"one": record}})
+    given = stated(mirror__drive_min="1 V", mirror__drive_max="5 V", a__sine="20 Hz", control__rate="500 Hz")
+    known = (
+        "The play was identified on recordings of another device, with 1 drive of 1 V to 2 V amplitude, 5 Hz to 50 Hz"
+        " and 1 µm of travel, sampled at 1 kHz. On records that were held out the model's error was 1.23 % (12.3 %"
+        " allowed)."
+    )
+    inside = "This mission lies within that: there the error of the mirror model is validated."
+    assert foundation.measured(given) == [foundation.Measured("the play", True, (), f"{known} {inside}")]
+    (fast,) = foundation.measured(given | stated(fine_pointing__rate="4 kHz"))
+    assert (fast.inside, fast.beyond) == (False, ("a rate of 4 kHz, 4 times the largest",))
+    assert fast.said == (
+        f"{known} This mission goes beyond that, with a rate of 4 kHz, 4 times the largest. There the error of the"
+        " mirror model is not known."
+    )
+    assert foundation.measured(stated(mirror__drive_min="1 V", mirror__drive_max="5 V", control__rate="4 kHz")) == []

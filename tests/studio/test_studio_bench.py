@@ -1563,3 +1563,21 @@ def test_a_mirror_in_keys_above_all_tables_makes_room_for_a_file(tmp_path, text,
     assert draft.text == after
     assert tomllib.loads(after.removeprefix("\ufeff"))["mirror"] == {"file": "s.toml"}
     assert with_mirror_file(draft, tmp_path / "s.toml").text == after
+
+
+def test_a_recording_says_its_rate_with_all_its_digits_and_gives_the_mirror_the_beginning_of_its_name():
+    found = mirror_form.first_setting(listed(("u", "V"), ("y", "rad"), rates=(12207.03125,)), f"{'n' * 150}.tar.csv")
+    assert (found.rate, found.name) == ("12207.03125 Hz", f"{'n' * 100}-mirror")
+    assert mirror_form.first_setting(listed(("u", "V")), "dir.d/run.2.csv").name == "run.2-mirror"
+
+
+def test_of_a_mirror_and_its_report_that_are_there_the_mirror_is_named(tmp_path):
+    recordings = [Dropped("k", "a.csv", tmp_path / "a.csv")]
+    said = []
+    for name in ("both.html", "both.toml", "v1.2.html"):
+        (tmp_path / name).touch()
+        with pytest.raises(SettingError) as refusal:
+            mirror_form.identification(tmp_path, recordings, Setting(0, 1, name=f" {name.rpartition('.')[0]} "))
+        said.append(str(refusal.value))
+    ends = "is there already and is left as it is; type another name"
+    assert said == [f"name of the mirror: {name} {ends}" for name in ("both.html", "both.toml", "v1.2.html")]

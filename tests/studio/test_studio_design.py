@@ -1374,3 +1374,18 @@ def test_a_confidence_below_all_of_the_time_is_not_told_as_all_of_it(draft):
     _, _, totals, said, _ = pointing_view.blocks(found)
     assert any(name.startswith("99.99999 % inside: ") for name in names)
     assert totals.folded.startswith("Totals at 99.99999 %: ") and " 99.99999 % would take " in said
+
+
+def test_a_contour_has_no_rate_where_the_whole_frame_has_more_or_less_than_its_margin(monkeypatch):
+    """A link with 30 dB at 1 Mbit/s on axis, that falls as rates do and by the square of the error in microradians."""
+
+    def margin(data, rates, errors):
+        return 30.0 - 10.0 * np.log10(rates / 1e6)[:, None] - np.atleast_1d(errors * 1e6)[None, :] ** 2
+
+    monkeypatch.setattr(link_view.link, "margin_map", lambda *given: margin(given[0], *map(np.atleast_1d, given[1:])))
+    frame = link_view.Frame(np.geomspace(1e6, 1e9, 5), np.array([0.0, 1.0, 3.0, 5.0, 6.0]) * 1e-6)
+    found = {level: link_view.contour(None, frame, level) for level in (6.0, -5.0)}
+    assert found[6.0] == pytest.approx(1e6 * 10.0 ** np.array([2.4, 2.3, 1.5, np.nan, np.nan]), rel=1e-9, nan_ok=True)
+    assert found[-5.0] == pytest.approx(
+        1e6 * 10.0 ** np.array([np.nan, np.nan, 2.6, 1.0, np.nan]), rel=1e-9, nan_ok=True
+    )

@@ -1250,3 +1250,29 @@ def test_only_the_address_of_an_upload_takes_a_large_body(path, large):
     assert Limits().of(path) == (200_065_536 if large else 1_000_000)
     assert Limits(7, 11, "/x").of("/x") == 65_547
     assert Limits(7, 11, "/x").of("/xy") == 7
+
+
+def test_a_link_of_another_site_is_followed_by_get_alone_and_says_once_where_it_comes_from():
+    inner = Inner()
+    link = {"sec_fetch_site": "cross-site", "sec_fetch_mode": "navigate", "sec_fetch_dest": "document"}
+    assert ask(guard(inner), "HEAD", **link).status == 403
+    for sites in (["same-origin", "cross-site"], ["none", "none"]):
+        assert ask(guard(inner), sec_fetch_site=sites).status == 403
+    assert ask(guard(inner), **{**link, "sec_fetch_mode": ["navigate", "navigate"]}).status == 403
+    assert inner.scopes == []
+    for site in ("same-origin", "none"):
+        assert ask(guard(inner), "HEAD", sec_fetch_site=site).status == 200
+
+
+def test_a_token_in_the_address_is_taken_from_a_request_for_the_head_too():
+    reply = ask(guard(Inner()), "HEAD", path="/runs", query=f"token={TOKEN}", cookie=None)
+    assert (reply.status, reply.headers[b"location"], reply.body) == (303, b"/runs", "")
+    assert reply.headers[b"set-cookie"].startswith(f"microrad_studio_{PORT}={TOKEN};".encode())
+
+
+def test_documents_of_a_second_beginning_run_in_a_sandbox_and_pages_connect_to_the_name_in_small_letters():
+    app = guard(Inner(), documents=("/results/", "/shown/"))
+    for path in ("/results/a", "/shown/b.html"):
+        assert "sandbox" in directives(ask(app, path=path))
+    page = directives(ask(app, path="/x/results/", host=f"LocalHost:{PORT}"))
+    assert "sandbox" not in page and page["connect-src"] == f"'self' ws://localhost:{PORT}"
