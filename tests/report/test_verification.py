@@ -3285,3 +3285,14 @@ def test_the_faster_of_two_loops_and_half_of_the_drives_range_are_held_against_r
         " mirror model is not known."
     )
     assert foundation.measured(stated(mirror__drive_min="1 V", mirror__drive_max="5 V", control__rate="4 kHz")) == []
+
+
+def test_what_signs_mean_stands_below_the_blocks_that_have_some_and_nowhere_else(far):
+    table = Table("t", ("", "one"), [("x", "12")], names={1: "z.b"})
+    given = stated(loop__rate="2 kHz", link__range="50000 km")
+    first, shown, last = marks.marked(["Words.", table], given)
+    assert (first, str(shown.rows[0][1]), last.title) == ("Words.", "12 †", "Signs behind numbers")
+    (legend,) = last.blocks
+    assert [line.partition(" = ")[0] for line in legend.lines] == ["† loop.rate"]
+    assert marks.marked(["Words."], given) == ["Words."]
+    assert marks.with_sign("7 µrad", given, "z.b") == "7 µrad †" and marks.with_sign("7 µrad", given, "z.c") == "7 µrad"

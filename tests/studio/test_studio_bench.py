@@ -1581,3 +1581,54 @@ def test_of_a_mirror_and_its_report_that_are_there_the_mirror_is_named(tmp_path)
         said.append(str(refusal.value))
     ends = "is there already and is left as it is; type another name"
     assert said == [f"name of the mirror: {name} {ends}" for name in ("both.html", "both.toml", "v1.2.html")]
+
+
+NOT_DISTURBED = "Nothing disturbs this loop, or nothing was asked."
+NO_ANSWERS = control_view.Answers({}, {}, {})
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [
+        (mirror_view.nothing, "Drop a recording to see it here."),
+        (lambda: control_view.sensitivity_plot(SimpleNamespace(sensitivity=None)), "No response by frequency."),
+        (lambda: control_view.gain_plot(SimpleNamespace(loop_gain=None)), "No response by frequency."),
+        (lambda: control_view.drive_plot(SimpleNamespace(), {}), NOT_DISTURBED),
+        (lambda: control_view.step_plot(NO_ANSWERS), NOT_DISTURBED),
+        (lambda: control_view.sine_plot(NO_ANSWERS), NOT_DISTURBED),
+        (lambda: control_view.jitter_plot(NO_ANSWERS), NOT_DISTURBED),
+        (lambda: control_view.motion_plot(NO_ANSWERS), NOT_DISTURBED),
+    ],
+)
+def test_a_plot_of_the_bench_without_anything_to_show_says_why(draw, words):
+    made = draw()
+    assert (made["data"], [each["text"] for each in made["layout"]["annotations"]]) == ([], [words])
+
+
+def test_a_loop_of_a_mirror_of_several_axes_is_told_where_it_is_designed(monkeypatch):
+    monkeypatch.setattr(control_model.mirror, "of", lambda mission: None)
+    file = SimpleNamespace(mission=SimpleNamespace(fine_pointing=SimpleNamespace(mirror_file="two.toml")))
+    with pytest.raises(ValueError, match="names a mirror") as refusal:
+        control_model._controller(file, "PI")
+    assert str(refusal.value) == (
+        "fine_pointing.mirror_file names a mirror of several axes, and this page designs for one: microrad design has "
+        "its controllers, and a run of the mission simulates them"
+    )
+    assert (PID, PID_INVERSE) == ("PID of [control]", "PID of [control] + inverse")
+
+
+@pytest.mark.parametrize(
+    ("arm", "words"),
+    [
+        (
+            " ",
+            "the output is a length (mm) and a mirror needs an angle; type the distance from the axis of rotation to "
+            'the point measured, such as "50 mm"',
+        ),
+        ("-5 um", "-5 um is not above 0; type a length such as 50 mm"),
+    ],
+)
+def test_a_lever_arm_that_is_none_is_refused_with_what_to_type(arm, words):
+    with pytest.raises(SettingError) as refusal:
+        mirror_form.lever_arm_m(Setting(output_unit="mm", lever_arm=arm))
+    assert str(refusal.value) == f"lever arm: {words}"

@@ -1389,3 +1389,23 @@ def test_a_contour_has_no_rate_where_the_whole_frame_has_more_or_less_than_its_m
     assert found[-5.0] == pytest.approx(
         1e6 * 10.0 ** np.array([np.nan, np.nan, 2.6, 1.0, np.nan]), rel=1e-9, nan_ok=True
     )
+
+
+def test_a_question_that_cannot_read_a_file_ends_with_the_words_of_the_system_and_how_far_it_came():
+    latest = Latest()
+
+    def work(progress):
+        progress(2, 5, "rows")
+        raise FileNotFoundError(2, "No such file or directory", "a.csv")
+
+    latest.ask("a", work)
+    state = latest.wait(HANG_S)
+    assert (state.error, state.running) == ("[Errno 2] No such file or directory: 'a.csv'", False)
+    assert (state.key, state.done, state.total, state.what, state.result) == ("a", 2, 5, "rows", None)
+
+
+def test_two_questions_of_one_owner_are_apart_by_their_names():
+    owner = threading.Event()
+    day, other = shared(owner, "day"), shared(owner, "links")
+    assert day is not other
+    assert (shared(owner, "day"), shared(owner, "links")) == (day, other)

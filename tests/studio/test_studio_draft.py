@@ -965,3 +965,18 @@ def test_examples_are_offered_in_the_order_of_the_shipped_mission_the_outermost_
     names = [*tables._examples()]
     assert [name for name in names if "." not in name] == OUTERMOST.split()
     assert [name for name in names if name.startswith(("channel.", "mirror.", "operations."))] == INNER.split()
+
+
+def test_a_list_with_comments_between_its_items_is_named_by_its_first_line(tmp_path):
+    draft = Draft("[a]\n\nx = [\n  1, # one\n  2,\n]\ny = 3\n", tmp_path / "m.toml", ())
+    with pytest.raises(DraftError) as refusal:
+        draft.set("a.x", "4")
+    assert str(refusal.value) == "a.x holds comments between its items (line 3); change it in the text"
+    assert draft.set("a.y", "4").text == draft.text.replace("y = 3", "y = 4")
+
+
+def test_a_file_that_is_in_order_once_it_is_looked_at_again_is_to_be_opened_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(drafts, "load_link", lambda path: None)
+    with pytest.raises(DraftError) as refusal:
+        Draft.open(tmp_path / "m.toml")
+    assert str(refusal.value) == f"{tmp_path / 'm.toml'} changed while it was read; open it again"

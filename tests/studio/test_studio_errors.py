@@ -115,3 +115,17 @@ def test_the_loop_of_a_budget_is_closed_with_the_light_and_arrival_of_its_own_li
     monkeypatch.setattr(errors, "close", lambda theory, controller: f"{theory} under {controller}")
     assert errors._closed(file) == "theory under the controller"
     assert asked == [(("mirror", True), ("light", True), ("arrival", True)), ("kept", True), ("theory", ["PI"])]
+
+
+def test_a_loop_that_cannot_be_a_source_is_refused_with_the_reason(monkeypatch):
+    with pytest.raises(ValueError, match="no mirror") as refusal:
+        errors._closed(SimpleNamespace())
+    assert str(refusal.value) == (
+        "error_budget.with_loop is true, and the mission has no mirror and no loop to be a source"
+    )
+    monkeypatch.setattr(errors, "mirror_of_loop", lambda file: "two.toml")
+    with pytest.raises(ValueError, match="several axes") as refusal:
+        errors._closed(object.__new__(errors.MissionFile))
+    assert str(refusal.value) == (
+        "the loop's mirror has several axes: microrad run has the budget with what that loop leaves"
+    )

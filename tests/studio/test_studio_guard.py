@@ -1276,3 +1276,21 @@ def test_documents_of_a_second_beginning_run_in_a_sandbox_and_pages_connect_to_t
         assert "sandbox" in directives(ask(app, path=path))
     page = directives(ask(app, path="/x/results/", host=f"LocalHost:{PORT}"))
     assert "sandbox" not in page and page["connect-src"] == f"'self' ws://localhost:{PORT}"
+
+
+def test_what_cannot_be_guarded_or_signed_and_who_does_not_say_a_page_are_told_in_whole_sentences():
+    from jinja2 import Environment
+
+    with pytest.raises(ValueError, match="guard") as refusal:
+        Guard(Inner(), (HOST,), (PAGE,), "short")
+    assert str(refusal.value) == (
+        "the guard needs hosts, their origins and a token of at least 32 characters; see new_token"
+    )
+    with pytest.raises(ValueError, match="loader") as refusal:
+        policy.sign_template(Environment(), "own.html")
+    assert str(refusal.value) == "the environment has no loader, so its template 'own.html' cannot be signed"
+    reply = ask(guard(Inner()), "POST", origin=None)
+    assert page_of(reply) == (
+        "Refused: forbidden",
+        "A request that acts says by its Origin which page it comes from; this one does not.",
+    )

@@ -477,3 +477,19 @@ def test_the_code_of_a_text_is_that_of_the_key_and_of_its_purpose():
     wanted = hmac.new(b"key", b"microrad studio job\0text", hashlib.sha256).hexdigest()
     assert signing._code(b"key", b"text") == wanted
     assert signing._code(b"kex", b"text") != wanted
+
+
+def test_what_stands_in_the_place_of_a_folder_or_holds_the_queue_is_named(own_key, jobs, tmp_path, monkeypatch):
+    monkeypatch.setattr(queue, "QUEUE_S", 0.0)
+    monkeypatch.setattr(queue, "start_waiting", lambda *_: None)
+    with jobs_files.held(jobs.folder / "lock", 0.0), pytest.raises(JobError) as refusal:
+        jobs.submit(Order("study", "t", ("presets",), tmp_path))
+    assert str(refusal.value) == f"the queue in {jobs.folder} is taken by another program; try again"
+    (tmp_path / "outer").touch()
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "jobs").touch()
+    for studio, folder in (("outer", tmp_path / "outer"), ("other", tmp_path / "other" / "jobs")):
+        with pytest.raises(JobError) as refusal:
+            Jobs(tmp_path / studio)
+        why = os.strerror(errno.EEXIST)
+        assert str(refusal.value) == f"{folder} cannot be made or made private: {why}; choose another folder"
