@@ -1632,3 +1632,16 @@ def test_a_lever_arm_that_is_none_is_refused_with_what_to_type(arm, words):
     with pytest.raises(SettingError) as refusal:
         mirror_form.lever_arm_m(Setting(output_unit="mm", lever_arm=arm))
     assert str(refusal.value) == f"lever arm: {words}"
+
+
+def test_a_controller_that_is_not_tuned_yet_has_a_row_that_says_why_beside_those_that_are(monkeypatch):
+    monkeypatch.setattr(control_model, "design_cells", lambda *of: ("to its margins", *map(str, of), *[""] * 5))
+    made = SimpleNamespace(residual_rad=1.2345e-6, tuned="a", margins="b", bound_by="c")
+    _, table, _ = control_model.blocks({"PI": "being tuned", "LQG": made})
+    assert list(table.headings)[:3] == ["controller", "residual of an axis,\nrms in theory (µrad)", "tuned to"]
+    assert [list(map(str, row)) for row in table.rows] == [
+        ["PI", "", "being tuned", "", "", ""],
+        ["LQG", "1.23", "to its margins", "a", "b", "c"],
+    ]
+    untold = next(each for each in control_model.blocks({"PI": "being tuned"}) if isinstance(each, Table))
+    assert (list(untold.headings), untold.rows) == (["controller", "tuned to"], [["PI", "being tuned"]])

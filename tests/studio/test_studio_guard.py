@@ -1294,3 +1294,21 @@ def test_what_cannot_be_guarded_or_signed_and_who_does_not_say_a_page_are_told_i
         "Refused: forbidden",
         "A request that acts says by its Origin which page it comes from; this one does not.",
     )
+
+
+def test_who_is_locked_out_or_sends_too_much_is_told_in_whole_sentences_what_to_do():
+    assert answers.locked("Why.") == answers.Answer(
+        403,
+        "The studio is locked",
+        "Why. Open the address that the command microrad studio printed, whole, with the token at its end. If it is "
+        "gone, stop the command with Ctrl-C and start it again.",
+        again=True,
+    )
+    for limit, said in ((200_065_536, "200.1"), (1_000_000, "1"), (1_234_500, "1.234")):
+        assert answers.too_large(limit) == answers.Answer(
+            413,
+            "The file is too large",
+            f"The studio takes at most {said} MB in one request. Cut out the part of the recording that you need, keep "
+            "every n-th sample, or run microrad identify on the file, which needs no upload.",
+            ((b"connection", b"close"),),
+        )

@@ -493,3 +493,28 @@ def test_what_stands_in_the_place_of_a_folder_or_holds_the_queue_is_named(own_ke
             Jobs(tmp_path / studio)
         why = os.strerror(errno.EEXIST)
         assert str(refusal.value) == f"{folder} cannot be made or made private: {why}; choose another folder"
+
+
+@pytest.mark.parametrize("text", [b'{"kind": "study", "ti', b"[]", b'{"folder": "x"}', b'{"folder": "\xff"}', b"7"])
+def test_a_description_of_ones_own_that_is_damaged_says_what_may_have_happened(own_key, jobs, text):
+    folder = jobs.folder / "12"
+    folder.mkdir()
+    (folder / "job.json").write_bytes(text)
+    (folder / "job.code").write_text(signing.code(text), "utf-8")
+    job = jobs_files.read_job(folder)
+    assert (job.number, job.state, job.words) == (
+        12,
+        "unreadable",
+        f"{folder / 'job.json'} is not taken: it is cut off, or was not written by microrad; remove this job, its "
+        "results are where they were",
+    )
+
+
+def test_a_job_is_run_in_a_folder_alone(jobs, tmp_path):
+    (tmp_path / "file").touch()
+    for place in ("file", "none"):
+        with pytest.raises(JobError) as refusal:
+            jobs.submit(Order("study", "t", ("presets",), tmp_path / place))
+        words = "is no folder to run a job in; choose another working folder"
+        assert str(refusal.value) == f"{tmp_path / place} {words}"
+    assert jobs_files.job_folders(jobs.folder) == []
