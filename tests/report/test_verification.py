@@ -3296,3 +3296,22 @@ def test_what_signs_mean_stands_below_the_blocks_that_have_some_and_nowhere_else
     assert [line.partition(" = ")[0] for line in legend.lines] == ["† loop.rate"]
     assert marks.marked(["Words."], given) == ["Words."]
     assert marks.with_sign("7 µrad", given, "z.b") == "7 µrad †" and marks.with_sign("7 µrad", given, "z.c") == "7 µrad"
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs"),
+    [
+        ("Margin | A", ["a"]),
+        ("Margin | New", ["a", "c", "e"]),
+        ("Margin", ["a", "c", "e"]),
+        ("Margin under fades", ["b"]),
+        ("Margin under", []),
+        ("Marg | A", []),
+    ],
+)
+def test_a_kind_that_is_new_has_the_inputs_of_all_kinds_of_its_quantity_and_of_none_that_begins_alike(
+    monkeypatch, kind, inputs
+):
+    depends = {"Margin | A": ["a"], "Margin under fades | A": ["b"], "Margin | B": ["c"], "A | Margin": ["d"]}
+    monkeypatch.setattr(marks, "shipped", lambda: {"depends": {**depends, "Margin | C": ["e"]}})
+    assert list(marks._inputs_of(kind)) == inputs
