@@ -3315,3 +3315,15 @@ def test_a_kind_that_is_new_has_the_inputs_of_all_kinds_of_its_quantity_and_of_n
     depends = {"Margin | A": ["a"], "Margin under fades | A": ["b"], "Margin | B": ["c"], "A | Margin": ["d"]}
     monkeypatch.setattr(marks, "shipped", lambda: {"depends": {**depends, "Margin | C": ["e"]}})
     assert list(marks._inputs_of(kind)) == inputs
+
+
+def test_a_link_that_is_called_like_a_way_of_the_data_is_a_link():
+    assert registry.kind_of("budgets.relay_down.margin_db") == "Link margin | Relay"
+    assert registry.kind_of("day.direct.requirements.a b c.actual") == "Requirement: actual and to spare | a b"
+
+
+def test_a_cell_with_a_mark_and_no_hint_has_the_reason_of_its_sign_for_a_hint(far):
+    table = Table("", ("", "one", "two"), [("x", Cell("3", "FAIL"), Cell("4", "PASS", "why"))], names={1: "b", 2: "b"})
+    _, bare, hinted = far.table(table).rows[0]
+    assert (str(bare), str(hinted)) == ("3 † FAIL", "4 † PASS")
+    assert bare.hint.startswith("loop.rate = 2 kHz is 2 times") and hinted.hint == f"why {bare.hint}"
