@@ -618,3 +618,14 @@ def test_the_times_of_a_text_have_four_digits_below_the_step(rate_hz, second):
     ]
     assert bench_folder._facts(made) == {"rate_hz": rate_hz}
     assert bench_folder._facts(replace(made, period_samples=2)) == {"rate_hz": rate_hz, "period_samples": 2}
+
+
+def test_a_record_without_noise_has_none_though_the_sensor_has_a_share_of_it(two_axes):
+    """A share of 0 in an excitation stands instead of that of the sensor: hum and drift alone are left."""
+    record = replace(two_axes.records[0], noise_share=0.0)
+    (recording,) = play(replace(two_axes, records=(record,)), 3)
+    angle = true_output(two_axes, record)[1]
+    time_s, added = np.arange(1000) / 500.0, recording.output - angle - 7e-3 * (np.arange(1000) / 500.0)[:, None]
+    hum = np.abs(np.exp(-2j * np.pi * 60 * time_s) @ added) * 2 / 1000
+    np.testing.assert_allclose(hum, 3e-3, rtol=0.02)
+    assert np.abs(added).max() < 3e-3 + 0.5 * 5.0 / 2**14 * (1 + 1e-9)
