@@ -222,3 +222,28 @@ def test_a_signal_has_the_rate_and_the_unit_of_its_own_channel(tmp_path):
         RecordingError, match=r"two sample rates: 41 Hz .given. and 40 Hz .one/fs = 40 Hz., 0.9756 times"
     ):
         read_signal(path, "one/p", 41.0)
+
+
+def test_a_file_of_a_time_alone_has_no_signal(tmp_path):
+    path = csv(tmp_path / "a.csv", "time (ms)", 1e3 * TIME)
+    with pytest.raises(RecordingError) as refused:
+        read_signal(path)
+    assert str(refused.value) == f"{path}: the file has 0 channels beside its time (none); name the one."
+
+
+@pytest.mark.parametrize("separator", [";", "\t", "  "])
+def test_a_signal_beside_others_may_have_any_separator(tmp_path, separator):
+    path = tmp_path / "a.csv"
+    np.savetxt(path, np.column_stack([TIME, X, Y]), delimiter=separator, header=separator.join("tpq"), comments="")
+    signal = read_signal(path, "q")
+    assert (signal.name, signal.rate_hz) == ("q", pytest.approx(500.0))
+    assert_allclose(signal.samples, Y)
+
+
+def test_a_time_that_is_named_has_to_be_numbers_though_the_rate_is_given(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "".join(f"12:00:{t:06.3f},{x!r}\n" for t, x in zip(TIME, X.tolist(), strict=True))
+    path.write_text("time,x (urad)\n" + rows)
+    assert read_motion(path, ("x (urad)",), 400.0).rate_hz == 400.0  # what is only called so is passed over
+    with pytest.raises(RecordingError, match=r"a\.csv: line 2, column 0 \('time'\): '12:00:00\.000' is not a number"):
+        read_motion(path, ("x (urad)",), 400.0, time="time")

@@ -2214,3 +2214,64 @@ def test_a_shape_may_leave_out_axes_of_length_one_where_all_of_them_are(shape, a
 def test_a_quoted_name_behind_a_blank_is_one_cell(blank):
     line = f'time,{blank}"u, x",{blank}y'
     assert text_format.split(line, ",") == ["time", "u, x", "y"]
+
+
+def test_a_time_that_is_named_is_as_long_as_the_channels(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, u=DRIVE, y=OUTPUT, clock=TIME_S[:-1])
+    assert "channel 0 ('u') has 1000 samples and channel 2 ('clock') 999; name channels that were sampled" in refusal(
+        path, "u", "y", time="clock"
+    )
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_neither_yes_nor_no_is_the_number_of_a_channel(tmp_path, wanted):
+    np.savez(tmp_path / "a.npz", u=DRIVE, v=DRIVE**2, y=OUTPUT, fs=RATE_HZ)
+    assert f"there is no input channel {wanted}: the NumPy file has 3 channels, numbered from 0" in refusal(
+        tmp_path / "a.npz", wanted, "y"
+    )
+
+
+def test_of_many_channels_with_one_last_name_ten_are_listed(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k in range(12):
+            file[f"g{k:02}/u"] = DRIVE
+    listed = ", ".join(f"'g{k:02}/u'" for k in range(10))
+    assert f": 'u' may be {listed}; give the input by its full name." in refusal(tmp_path / "a.h5", "u", "y")
+
+
+def test_a_name_of_time_may_have_blanks_about_it_in_its_group():
+    assert is_time_name(" t ") and is_time_name("run/one/ time (s) ")
+    assert not is_time_name("time/u") and not is_time_name("T")
+
+
+def test_a_drive_that_is_called_t_is_no_time_where_it_is_the_input(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = zip((40 + DRIVE).tolist(), OUTPUT.tolist(), strict=True)
+    path.write_text("t,y\n" + "".join(f"{u!r},{y!r}\n" for u, y in rows))
+    read = read_recording(path, "t", "y", RATE_HZ)
+    np.testing.assert_allclose(read.drive[:, 0], 40 + DRIVE)
+    assert (read.rate_hz, read.input_names) == (RATE_HZ, ("t",))
+    assert "does not say how fast it was sampled" in refusal(path, "t", "y")
+
+
+def test_the_clock_of_an_lvm_segment_may_have_a_comma_where_its_numbers_have_none(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=3)
+    path.write_bytes(re.sub(rb"12:00:(\d\d)\.", rb"12:00:\1,", path.read_bytes()))
+    check(read_recording(path, "drive", "output"))
+
+
+def test_a_decimal_comma_in_an_lvm_file_of_points_is_named_by_its_cell(tmp_path):
+    path = tmp_path / "a.lvm"
+    path.write_text(LVM_HEAD + lvm_segment(row_7="3.5\t0.25\t0,75"))
+    assert "line 18, channel 2 ('y'): '0,75' is not a finite number; repair the cell" in refusal(path, "u", "y")
+
+
+def test_decimal_commas_are_told_from_the_names_just_above_the_rows(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("Stage 4\nu,y\n" + "1,25,3,5\n" * 300)
+    assert "the header names 2 columns and the rows have 4: decimal commas, which cannot be told" in refusal(path, 0, 1)
+    path.write_text("u;y\n" + "".join(f"{k % 17};{k};{k % 23};5\n" for k in range(300)))
+    source = open_source(path)
+    assert source.names == ("0", "1", "2", "3")
+    assert source.load([2])[0].tolist() == [k % 23 for k in range(300)]
