@@ -716,3 +716,12 @@ def test_a_chirp_that_begins_too_fast_is_told_of_both_ends():
         ("start", "at most 138.2 Hz"),
         ("stop", "at most 138.2 Hz"),
     ]
+
+
+def test_sines_may_fall_and_their_limits_are_those_of_the_largest():
+    """A tenth of a second at each amplitude; the largest one stands in the middle."""
+    made = growing_sines(LIMITS, freq_hz=20.0, amplitudes_v=[2.0, 5.0, 1.0], periods=2, offset_v=6.0)
+    tops = [np.abs(part - 6.0).max() for part in np.split(made.drive[:, 0], 3)]
+    assert tops == pytest.approx([2.0, 5.0, 1.0], rel=1e-9) and made.samples == 3000
+    with pytest.raises(DesignError, match=r"amplitudes takes the drive to 13 V, .*at most 6 V"):
+        growing_sines(LIMITS, freq_hz=20.0, amplitudes_v=[2.0, 7.0, 1.0], periods=2, offset_v=6.0)

@@ -10,6 +10,7 @@ import pytest
 
 from microrad.lab.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
 from microrad.lab.recording.formats.text import Layout, TextSource, _are_units, _guess_delimiter, _is_regular, split
+from microrad.lab.recording.reader import named_part
 from microrad.lab.recording.records import Finding, check_stated, digest_of, frozen, read_in, stated_units
 
 N = 400
@@ -712,3 +713,11 @@ def test_the_first_samples_of_a_recording_keep_all_else():
     )
     assert part.sha256 == made.sha256 and part.findings == made.findings and made.step_s == 0.008
     assert made.first(900).samples == N and part.drive[-1, 0] == DRIVE[249] and part.output[-1, 0] == OUTPUT[249]
+
+
+def test_a_part_that_ends_where_it_begins_at_nought_is_none(tmp_path):
+    np.savez(tmp_path / "a.npz", u=DRIVE, y=OUTPUT, fs=125.0)
+    with pytest.raises(RecordingError, match=r"from 0 s to 0 s is no part of a recording of 3.2 s; give two times"):
+        read_recording(tmp_path / "a.npz", "u", "y", part_s=(0.0, 0.0))
+    assert named_part("a", (0.0, 0.0)) == "a from 0 s to 0 s"
+    assert named_part("a", (0.0, 2.5)) == "a from 0 s to 2.5 s" and named_part("a", (0.0, None)) == "a"

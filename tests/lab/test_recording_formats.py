@@ -2,6 +2,7 @@
 
 import io
 import itertools
+import logging
 import math
 import pickle
 import re
@@ -27,7 +28,7 @@ from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels
 from microrad.lab.recording.formats.hdf5 import _lzf_bytes, unusable_dataset
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.formats.source import Container, StatedRate, is_time_name, time_unit
-from microrad.lab.recording.formats.tdms import _check_scales, check_structure
+from microrad.lab.recording.formats.tdms import _check_scales, _Listener, check_structure
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
 from places import ROOT
@@ -2275,3 +2276,61 @@ def test_decimal_commas_are_told_from_the_names_just_above_the_rows(tmp_path):
     source = open_source(path)
     assert source.names == ("0", "1", "2", "3")
     assert source.load([2])[0].tolist() == [k % 23 for k in range(300)]
+
+
+@pytest.mark.parametrize("wanted", ["cube[1,0]", "cube[1, 0]", "cube[1 ,  0]", "run/cube[1,0]"])
+def test_a_channel_of_an_array_of_three_axes_has_one_name_however_it_is_spaced(tmp_path, wanted):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["run/cube"] = np.stack([np.stack([OUTPUT, DRIVE]), np.stack([DRIVE, OUTPUT])])[:, :, :, None]
+        file["run/cube"].attrs["unit"] = "mV"
+        file.attrs["Fs"] = RATE_HZ
+    (named,) = read_recording(path, wanted.replace("]", ", 0]"), "cube[1,1,0]").input_names
+    assert named == ("run/" if "run" in wanted else "") + "cube[1, 0, 0]"
+    read = read_recording(path, wanted.replace("]", ",0]"), "cube[1, 1, 0]")
+    np.testing.assert_array_equal(read.drive[:, 0], DRIVE)
+    np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
+    assert (read.input_units, read.output_units) == (("mV",), ("mV",))
+
+
+def test_attributes_that_state_a_rate_are_known_in_any_case_of_letters_and_held_against_each_other(tmp_path):
+    path = hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "w") as file:
+        file["u"], file["y"] = DRIVE, OUTPUT
+        file.attrs["Sample_Rate"] = 500.0
+    assert read_recording(path, "u", "y").rate_hz == 500.0
+    with h5py.File(path, "a") as file:
+        file["FS"] = 400.0
+    told = refusal(path, "u", "y")
+    assert "two sample rates: 500 Hz (Sample_Rate = 500 Hz) and 400 Hz (FS = 400 Hz), 0.8 times as much" in told
+
+
+@pytest.mark.parametrize(("groups", "deep"), [(50, False), (51, True)])
+def test_a_dataset_may_stand_in_fifty_groups_one_in_the_other(tmp_path, groups, deep):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["y"], file["d/" * groups + "u"] = OUTPUT, DRIVE
+    if deep:
+        assert "groups are nested more than 50 deep" in refusal(tmp_path / "a.h5", "u", "y", RATE_HZ)
+    else:
+        assert read_recording(tmp_path / "a.h5", "u", "y", RATE_HZ).input_names == ("d/" * groups + "u",)
+
+
+def test_segments_that_are_not_joined_have_their_own_numbers_of_rows(tmp_path):
+    source = LvmSource(lvm(tmp_path / "a.lvm", segments=3, gap_s=0.1))
+    assert source.samples() == (334, 334, 333, 333, 333, 333)
+
+
+def test_of_the_librarys_warnings_those_of_this_thread_about_numbers_are_heard():
+    listener = _Listener()
+    told = logging.LogRecord("nptdms", logging.WARNING, "", 0, "Cropping data from %s", ("4",), None)
+    for change in ({}, {"thread": told.thread + 1}, {"msg": "Unsupported version %s"}):
+        record = logging.makeLogRecord({**vars(told), **change})
+        listener.emit(record)
+    assert listener.heard == ["Cropping data from 4"]
+
+
+def test_the_longest_axis_counts_the_samples_of_what_is_too_large(tmp_path):
+    (tmp_path / "a").write_bytes(b"0" * 500_000)
+    assert files.too_large(tmp_path / "a", (3, 40_000_000, 2), 8).startswith(
+        "states 40000000 samples, 1920 MB in a file of 0.5 MB, and at most 256 MB are unpacked from that;"
+    )
