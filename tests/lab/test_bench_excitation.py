@@ -725,3 +725,13 @@ def test_sines_may_fall_and_their_limits_are_those_of_the_largest():
     assert tops == pytest.approx([2.0, 5.0, 1.0], rel=1e-9) and made.samples == 3000
     with pytest.raises(DesignError, match=r"amplitudes takes the drive to 13 V, .*at most 6 V"):
         growing_sines(LIMITS, freq_hz=20.0, amplitudes_v=[2.0, 7.0, 1.0], periods=2, offset_v=6.0)
+
+
+def test_a_ramp_may_be_as_steep_as_the_limit_though_rounding_passes_it():
+    """4.9 V in 7 ms at 700 V/s: in floating point the quotient lies above the limit."""
+    limits = Limits(rate_hz=1000.0, drive_min_v=0.0, drive_max_v=9.0, slew_v_s=700.0, samples_per_period=4.0)
+    assert 4.9 / 7 * 1000.0 > 700.0
+    made = staircase(limits, levels_v=[1.0, 1.0 + 4.9, 1.0], dwell_s=5e-3, rise_s=7e-3)
+    assert made.step_samples == (12, 24) and made.samples == 30
+    with pytest.raises(DesignError, match=r"rise makes the largest step one of 816\.7 V/s, .*would fit: at least 7 ms"):
+        staircase(limits, levels_v=[1.0, 5.9, 1.0], dwell_s=5e-3, rise_s=6e-3)

@@ -369,3 +369,12 @@ def test_the_time_constant_of_an_amplifier_is_that_of_its_corner(bandwidth_hz):
     assert Amplifier(bandwidth_hz, 7.0).time_constant_s == pytest.approx(
         1 / (6.283185307179586 * bandwidth_hz), rel=1e-12
     )
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_amplifier_slews_up_and_down_alike(side):
+    """A step of 2 V, of which 1 V takes 10 ms at 100 V/s, and then an exponential of 10 ms is left of the other."""
+    run = _MirrorState(BenchMirror(), Amplifier(1 / (0.02 * math.pi), 100.0), 5.0, 5e-3)
+    volts = run.amplified(np.full(5, 5.0 + 2.0 * side))
+    left = [2.0, 1.5, 1.0, math.exp(-0.5), math.exp(-1.0)]
+    np.testing.assert_allclose(volts, 5.0 + side * (2.0 - np.array(left)), rtol=1e-12)

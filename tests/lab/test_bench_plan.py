@@ -740,3 +740,19 @@ def test_two_records_do_not_write_one_file(refuse, tmp_path, formats, told):
         path = tmp_path / "plan.toml"
         path.write_text(text, encoding="utf-8")
         assert load_plan(path).formats == ("mat73", "npz")
+
+
+def test_for_a_plan_that_is_binary_no_other_plan_is_offered_and_for_one_that_is_missing_those_that_there_are(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xff\xfe\x00")
+    for name, reason, expected in (
+        ("a.toml", "the plan file holds binary data", "a TOML file, plain text in UTF-8"),
+        (
+            "b.toml",
+            "the plan file does not exist",
+            "a plan file, or one of mirror-characterisation, paper-experiment",
+        ),
+    ):
+        with pytest.raises(PlanError) as refused:
+            load_plan(tmp_path / name)
+        (fault,) = refused.value.faults
+        assert (fault.reason, fault.expected, fault.file) == (reason, expected, str(tmp_path / name))

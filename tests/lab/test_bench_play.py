@@ -6,6 +6,7 @@ import json
 import math
 import zlib
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import lvm_read
@@ -21,7 +22,7 @@ from microrad.lab.bench import load_plan, play, select_records, write_folder
 from microrad.lab.bench.mirrors import bouc_wen_output, linear_output
 from microrad.lab.bench.plan import FORMATS, PlanError
 from microrad.lab.bench.play import BenchError, Converter, _check_range, true_output
-from microrad.lab.recording import Recording, read_recording
+from microrad.lab.recording import Recording, RecordingError, read_recording
 
 SEED = 5
 
@@ -629,3 +630,28 @@ def test_a_record_without_noise_has_none_though_the_sensor_has_a_share_of_it(two
     hum = np.abs(np.exp(-2j * np.pi * 60 * time_s) @ added) * 2 / 1000
     np.testing.assert_allclose(hum, 3e-3, rtol=0.02)
     assert np.abs(added).max() < 3e-3 + 0.5 * 5.0 / 2**14 * (1 + 1e-9)
+
+
+def test_rows_of_a_text_go_on_from_block_to_block(monkeypatch):
+    values = np.arange(22.0).reshape(11, 2)
+    made = Recording("r", "", values, values[:, :1] ** 2, 8.0, ("u", "v"), ("y",), None, ("V", "V"), ("mrad",))
+    whole = "".join(bench_folder._rows(made, ","))
+    monkeypatch.setattr(bench_folder, "_ROWS", 4)
+    assert [part.count("\n") for part in bench_folder._rows(made, ",")] == [4, 4, 3]
+    assert "".join(bench_folder._rows(made, ",")) == whole
+    assert whole.splitlines()[9] == "1.12500,18,19,324"
+
+
+def test_what_a_check_finds_in_a_folder_can_be_taken_on(tmp_path):
+    time_s = np.arange(1000) / 500.0
+    drive = np.sin(2 * np.pi * 3.0 * time_s)
+    np.savez(tmp_path / "a.npz", u=drive, y=drive, rate_hz=500.0)
+    np.savez(tmp_path / "b.npz", u=drive, y=np.minimum(drive, 0.6), rate_hz=500.0)
+    entry = {"inputs": ["u"], "outputs": ["y"], "period_samples": None}
+    records = [{**entry, "files": [f"{name}.npz"], "use": use} for name, use in (("a", "identification"), ("b", "x"))]
+    (tmp_path / "manifest.json").write_text(json.dumps({"records": records}), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"b\.npz: the output, channel 1 \('y'\) is clipped at 0\.6: "):
+        bench_folder.read_folder(tmp_path)
+    found = bench_folder.read_folder(tmp_path, ("clipping",))
+    assert [(Path(each.path).name, use) for each, use in found] == [("a.npz", "identification"), ("b.npz", "x")]
+    assert [[f.kind for f in each.findings if f.refused] for each, _ in found] == [[], ["clipping"]]

@@ -361,3 +361,22 @@ def test_a_drive_reverses_where_it_goes_on_by_more_than_a_twentieth_of_its_range
 )
 def test_a_record_is_judged_behind_where_its_drive_has_swept_95_per_cent_or_its_middle(drive, first):
     assert records.transient(np.array(drive, dtype=float)) == first
+
+
+def test_of_many_sweeps_and_few_the_rates_of_the_few_count_in_either_order():
+    """Two hundred sweeps at 157 V/s, three at 3 V/s and three at 314 V/s: each record's median is in the range."""
+    time = np.arange(8000) / 2000.0
+    many = of(np.sin(2 * np.pi * 25.0 * time), time**2, 2000.0)
+    slow = of(np.sin(2 * np.pi * 0.5 * time), time**2, 2000.0)
+    fast = of(10.0 * np.sin(2 * np.pi * 5.0 * time[:800]), time[:800] ** 2, 2000.0)
+    for given in ([many, slow, fast], [slow, fast, many], [fast, many, slow]):
+        assert loop_rates(si_records(given, Units())) == pytest.approx((np.pi, 100 * np.pi), rel=0.02)
+    assert loop_rates(si_records([many], Units())) == pytest.approx((50 * np.pi, 50 * np.pi), rel=0.02)
+
+
+def test_the_noisiest_of_two_drives_is_told_in_either_order():
+    wave = 4.0 * np.sin(2 * np.pi * 20 * TIME)
+    noise = 0.01 * truths.philox(1).standard_normal(wave.size)
+    calm, noisy = (of(drive, wave, RATE, name) for name, drive in (("a", wave), ("b", wave + noise)))
+    one, other = (noisiness(si_records(given, Units())) for given in ((calm, noisy), (noisy, calm)))
+    assert one == other == pytest.approx(np.sqrt(2) * 0.01 * RATE / PEAK, rel=0.15)

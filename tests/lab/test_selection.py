@@ -1285,3 +1285,12 @@ def test_no_correlation_is_beyond_one_where_rounding_has_left_a_covariance_witho
     covariance = np.array([[0.0, 1e10, 0.0], [1e10, 4.0, -2.0000000001], [0.0, -2.0000000001, 1.0]])
     found = correlation(covariance)
     assert_allclose(found, [[0.0, 1.0, 0.0], [1.0, 1.0, -1.0], [0.0, -1.0, 1.0]])
+
+
+def test_the_residuals_of_all_recordings_choose_the_model():
+    """The first recording alone would choose the other one."""
+    fits = [SimpleNamespace(admissible=True, parameter_count=n) for n in (3, 4)]
+    one, other = philox(3).standard_normal((2, 1000))
+    assert choose_best(fits, [[0.5 * one, 3.0 * other], [one, other]]) == 1
+    assert choose_best(fits[::-1], [[one, other], [0.5 * one, 3.0 * other]]) == 0
+    assert choose_best(fits, [[0.5 * one], [one]]) == 0
