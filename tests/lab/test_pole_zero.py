@@ -717,3 +717,14 @@ def test_an_order_with_a_pole_that_no_recording_shows_is_not_worse_by_a_price():
     of = [OrderScore(n, n, 10.0 * n, 100, c, 0.0) for n, c in ((1, 50.0), (2, 1e12 + 30.0), (3, 2e12))]
     assert axis._reason(of[0], of).endswith("noise); order 2 has a pole that no recording shows")
     assert axis._reason(of[0], [of[0], OrderScore(2, 2, 20.0, 100, 9e11, 0.0)]).endswith("is worse by 900000000000")
+
+
+def test_of_zeros_beside_a_pole_one_of_its_own_kind_goes_with_it():
+    """A real zero on the right stands beside a real pole, a pair beside a pair; of two beside a pole the first goes."""
+    zeros = Roots((100.0, 101.0, 99.0, 102.0), (0.4, -1.0, 1.0, -0.3))
+    linear = LinearPoles(Roots((100.0, 103.0, 1e3, 2e3, 3e3, 4e3), (1.0, 0.2, 1.0, 1.0, 1.0, 1.0)), zeros, 30.0, 1e-4)
+    real, pair = _fewer_poles(fitted_to(linear, (2.0, 1.0, 1e-3, 1e-3, 1e-3, 1e-3)))
+    assert real.poles.frequencies_hz[:2] == (103.0, 1e3) and pair.poles.frequencies_hz[:2] == (100.0, 1e3)
+    assert real.zeros.frequencies_hz == (100.0, 99.0, 102.0)
+    assert pair.zeros.frequencies_hz == (101.0, 99.0, 102.0)
+    assert real.delay_s == pair.delay_s == 1e-4

@@ -1742,3 +1742,18 @@ def test_a_lost_sample_shows_where_the_time_has_just_the_digits_of_its_step(rate
     else:
         rate, _ = rate_of_time("a.csv", "t", time_s, str)
         assert rate.rate_hz == pytest.approx(rate_hz, rel=3e-3)
+
+
+def test_of_two_recordings_the_one_that_is_the_same_as_a_third_is_named():
+    made = [recording_from_arrays(SINE[k:], GOOD[k:], RATE_HZ, name) for k, name in enumerate(("one", "two"))]
+    again = recording_from_arrays(SINE[1:], GOOD[1:], RATE_HZ, "again")
+    assert said(lambda: check_together([*made, again])).startswith("again: the same data as two; give each recording")
+    assert said(lambda: check_together(made[:1], [made[1], again])).startswith("again: the same data as two; give")
+
+
+def test_of_two_places_where_time_runs_back_the_larger_is_named():
+    """Where two recordings were joined, not where a clock was set by a few milliseconds."""
+    time_s = np.concatenate([CLOCK[:100], CLOCK[98:200], CLOCK[:150]])
+    assert said(lambda: rate_of_time("f", "'t'", time_s, lambda row: f"row {row}")) == (
+        "f: row 202, 't': time runs back from 0.995 to 0 s; two recordings may have been joined: cut them apart."
+    )

@@ -796,3 +796,17 @@ def test_the_name_of_a_file_that_is_empty_is_said_to_be_so(tmp_path):
     with pytest.raises(RecordingsError, match="is empty") as refused:
         read_list(write_list(tmp_path, entry))
     assert refused.value.faults[0].key == "recording.a.file"
+
+
+def test_one_drive_and_two_outputs_have_a_unit_a_place_and_a_sign_for_each(tmp_path):
+    np.savez(tmp_path / "a.npz", u=DRIVE[:, 0], y=OUTPUT[:, 0], x=OUTPUT[::-1, 0] + OUTPUT[:, 0], fs=RATE_HZ)
+    entry = '[recording.a]\nfile = "a.npz"\ninput = "u"\noutput = ["y", "x"]\ninput_unit = "mV"\noutput_unit = "um"\n'
+    found = read_list(write_list(tmp_path, f"signs = [[1], [-1]]\n{entry}"))
+    assert found.signs == ((1,), (-1,))
+    assert [(r.input_units, r.output_units) for r in found.recordings] == [(("mV",), ("um", "um"))]
+    assert "signs has rows of 2 items and there are 2 outputs and 1 input; give a row for each" in refusal(
+        tmp_path, f"signs = [[1, -1]]\n{entry}"
+    )
+    assert "positions has 1 places and there are 2 outputs, y, x; give one place for each, in their order." in refusal(
+        tmp_path, f'positions = [["1 mm", "2 mm"]]\n{entry}'
+    )

@@ -1294,3 +1294,23 @@ def test_the_residuals_of_all_recordings_choose_the_model():
     assert choose_best(fits, [[0.5 * one, 3.0 * other], [one, other]]) == 1
     assert choose_best(fits[::-1], [[one, other], [0.5 * one, 3.0 * other]]) == 0
     assert choose_best(fits, [[0.5 * one], [one]]) == 0
+
+
+def test_roots_to_the_right_of_the_axis_are_known_by_their_frequency_as_those_to_the_left_are():
+    """A real zero with damping -1 has all of its error; a pair of which the real part is small has half of its."""
+    linear = LinearPoles(Roots((40.0, 100.0), (1.0, 0.1)), Roots((60.0, 90.0), (-1.0, -0.2)), 3.0)
+    names = ("pole 1", "pole 2", "pole 2 damping", "zero 1", "zero 2", "zero 2 damping")
+    known = SimpleNamespace(covariance=1e-18 * np.eye(6), standard_errors=np.full(6, 1e-9))
+    parameters = [SimpleNamespace(name=name) for name in names]
+    fit = joint_fit_of(fit=known, linear=linear, structure=SimpleNamespace(parameters=parameters))
+    turn = 2 * np.pi
+    response = SimpleNamespace(
+        delay_error_s=0.0,
+        poles_rad_s=turn * np.array([-10 + 99.5j, -10 - 99.5j, -40.0]),
+        poles_error_rad_s=turn * np.array([2.0, 2.0, 3.0]),
+        zeros_rad_s=turn * np.array([18 + 88.2j, 18 - 88.2j, 60.0]),
+        zeros_error_rad_s=turn * np.array([5.0, 5.0, 7.0]),
+    )
+    found = np.sqrt(np.diag(candidates._held_covariance(fit, response)))
+    half = np.sqrt(0.5)
+    assert_allclose(found, [3.0, 2 * half, 2 * half / 100, 7.0, 5 * half, 5 * half / 90], rtol=1e-9)
