@@ -721,3 +721,35 @@ def test_a_part_that_ends_where_it_begins_at_nought_is_none(tmp_path):
         read_recording(tmp_path / "a.npz", "u", "y", part_s=(0.0, 0.0))
     assert named_part("a", (0.0, 0.0)) == "a from 0 s to 0 s"
     assert named_part("a", (0.0, 2.5)) == "a from 0 s to 2.5 s" and named_part("a", (0.0, None)) == "a"
+
+
+def test_cells_in_quotes_may_have_a_blank_before_them():
+    assert split('a, "b, c",  "d"', ",") == ["a", "b, c", "d"]
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\n\n", "\r\n"])
+def test_the_digest_is_that_of_the_whole_file_however_it_ends(tmp_path, end):
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{u!r},{y!r}" for u, y in zip(DRIVE.tolist(), OUTPUT.tolist(), strict=True))
+    path.write_bytes(f"u,y\n{rows}{end}".encode())
+    read = read_recording(path, "u", "y", 125.0)
+    assert read.sha256 == hashlib.sha256(path.read_bytes()).hexdigest() and read.samples == N
+
+
+def test_remarks_may_be_indented_where_cells_stand_in_quotes(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = [f'"{u!r}", {y!r}' for u, y in zip(DRIVE.tolist(), OUTPUT.tolist(), strict=True)]
+    rows[100] += '\n  # the "lamp" was changed\n\t% and so on'
+    path.write_text("u,y\n" + "\n".join(rows) + "\n")
+    read = read_recording(path, "u", "y", 125.0)
+    np.testing.assert_array_equal(read.drive[:, 0], DRIVE)
+    np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+def test_text_of_two_bytes_a_letter_is_named_in_either_order_of_bytes(tmp_path, encoding):
+    path = tmp_path / "a.csv"
+    path.write_bytes(("\ufeffu,y\n" + "1,2\n" * 300).encode(encoding))
+    with pytest.raises(RecordingError) as refused:
+        read_recording(path, "u", "y", 125.0)
+    assert str(refused.value) == f"{path}: this is UTF-16 text; export the recording as plain text (CSV, UTF-8)."

@@ -2334,3 +2334,38 @@ def test_the_longest_axis_counts_the_samples_of_what_is_too_large(tmp_path):
     assert files.too_large(tmp_path / "a", (3, 40_000_000, 2), 8).startswith(
         "states 40000000 samples, 1920 MB in a file of 0.5 MB, and at most 256 MB are unpacked from that;"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "said"),
+    [
+        ("time (ms)", "us", "us"),
+        ("time (ms)", "", "ms"),
+        ("Time_MS", "", "ms"),
+        ("time_us", "ns", "ns"),
+        ("t_x", "", "s"),
+    ],
+)
+def test_the_unit_of_a_time_is_the_one_stated_and_then_that_of_its_name(name, unit, said):
+    assert time_unit(name, unit) == said
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.mat", "a.h5"])
+def test_an_array_that_is_called_t_is_no_time_where_it_is_the_input(tmp_path, name):
+    path, arrays = tmp_path / name, {"t": 40 + DRIVE, "y": OUTPUT}
+    if name == "a.npz":
+        np.savez(path, **arrays)
+    elif name == "a.mat":
+        savemat(path, arrays)
+    else:
+        with h5py.File(path, "w") as file:
+            for key, values in arrays.items():
+                file[key] = values
+    read = read_recording(path, "t", "y", RATE_HZ)
+    np.testing.assert_array_equal(read.drive[:, 0], 40 + DRIVE)
+    assert (read.rate_hz, read.input_names, read.findings[0].kind) == (RATE_HZ, ("t",), "unexcited")
+
+
+def test_both_numbers_of_a_version_of_numpys_format_that_is_not_known_are_told(tmp_path):
+    (tmp_path / "a.npy").write_bytes(npy_header(WHOLE, version=(4, 1)) + DRIVE.tobytes())
+    assert "version 4.1 of the format is not known" in refusal(tmp_path / "a.npy", 0, 1)
