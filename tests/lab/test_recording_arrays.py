@@ -549,3 +549,35 @@ def test_a_sample_of_a_drive_that_is_no_size_is_refused_without_a_warning(tmp_pa
     drive[5, 1, 2, 1] = sample
     np.savez(tmp_path / "a.npz", u=drive, y=SEEN, fs=RATE_HZ)
     assert words in refusal(tmp_path / "a.npz", "u", "y")
+
+
+def test_a_sample_of_outputs_in_a_file_of_their_own_is_named_with_that_file(tmp_path):
+    broken = Y.copy()
+    broken[17, 1, 2, 1] = np.inf
+    np.save(tmp_path / "u.npy", U)
+    np.save(tmp_path / "y.npy", broken)
+    message = refusal(tmp_path / "u.npy", rate_hz=RATE_HZ, output_path=tmp_path / "y.npy")
+    assert message.startswith(
+        f"{tmp_path / 'u.npy'} realisation 2: sample 17 of period 1 of the output, output[1] of "
+        f"{tmp_path / 'y.npy'} is inf, 1 such sample in all; "
+    )
+    broken[17, 1, 2, 1], U_broken = 0.0, U.copy()
+    U_broken[3, 0, 1, :] = np.nan
+    np.save(tmp_path / "u.npy", U_broken)
+    message = refusal(tmp_path / "u.npy", rate_hz=RATE_HZ, output_path=tmp_path / "y.npy")
+    assert " realisation 1: sample 3 of period 0 of the input, drive[0] is nan, 2 such samples in all; " in message
+
+
+def test_what_a_check_finds_in_one_of_several_realisations_can_be_taken_on():
+    """The second output of the second realisation is cut off at half of what it reaches."""
+    time_s = np.arange(400) / RATE_HZ
+    drive = np.stack([np.sin(2 * np.pi * f * time_s) for f in (10.0, 20.0)], axis=1)[:, None, :]
+    drive = np.repeat(drive[..., None], 2, axis=3)
+    output = np.concatenate([drive, 2.0 * drive], axis=1)
+    output[:, 1, 1] = np.minimum(output[:, 1, 1], 1.0)
+    with pytest.raises(RecordingError, match=r"^bench realisation 1: the output 1 is clipped at 1: ") as caught:
+        multisine_recordings(drive, output, RATE_HZ, "bench")
+    assert [(each.kind, each.output) for each in caught.value.findings] == [("clipping", 1)]
+    found = multisine_recordings(drive, output, RATE_HZ, "bench", accept=("clipping",))
+    assert [[each.kind for each in r.findings if each.refused] for r in found] == [[], ["clipping"]]
+    assert [(r.path, r.period_samples) for r in found] == [("bench realisation 0", 400), ("bench realisation 1", 400)]

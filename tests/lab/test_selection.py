@@ -1314,3 +1314,13 @@ def test_roots_to_the_right_of_the_axis_are_known_by_their_frequency_as_those_to
     found = np.sqrt(np.diag(candidates._held_covariance(fit, response)))
     half = np.sqrt(0.5)
     assert_allclose(found, [3.0, 2 * half, 2 * half / 100, 7.0, 5 * half, 5 * half / 90], rtol=1e-9)
+
+
+@pytest.mark.parametrize("scale", [0.98, 1.02])
+def test_of_models_alike_in_all_else_the_one_with_the_lower_residual_is_chosen(scale):
+    fits = [SimpleNamespace(admissible=True, parameter_count=4)] * 3
+    noise, other = philox(4).standard_normal((2, 1000))
+    other *= scale * np.sqrt(noise @ noise / (other @ other))  # by less than two standard errors
+    best = 1 if scale < 1.0 else 0
+    assert choose_best(fits, [[noise], [other], [3.0 * noise]]) == best
+    assert choose_best(fits, [[3.0 * noise], [noise], [other]]) == 1 + best
