@@ -1757,3 +1757,12 @@ def test_of_two_places_where_time_runs_back_the_larger_is_named():
     assert said(lambda: rate_of_time("f", "'t'", time_s, lambda row: f"row {row}")) == (
         "f: row 202, 't': time runs back from 0.995 to 0 s; two recordings may have been joined: cut them apart."
     )
+
+
+def test_an_output_may_rest_as_long_as_any_of_its_drives_does():
+    slow, fast = np.sin(2 * np.pi * 3 * TIME_S), np.sin(2 * np.pi * 41 * TIME_S)
+    resting = np.clip(slow, -0.8, 0.8)
+    for drives in ([fast, resting], [resting, fast]):
+        assert clipping("y", 2 * resting, lambda row: f"row {row}", drives) == []
+    found = clipping("y", 2 * resting, lambda row: f"row {row}", [fast, slow])
+    assert [each.message.partition(":")[0] for each in found] == ["y is clipped at 1.6", "y is clipped at -1.6"]

@@ -2364,3 +2364,36 @@ def test_both_numbers_of_a_version_of_numpys_format_that_is_not_known_are_told(t
 def test_the_time_of_a_channel_is_the_one_of_its_length_whatever_stands_first(tmp_path):
     np.savez(tmp_path / "a.npz", other=DRIVE[:300], t=TIME_S[:300] * 3, time=TIME_S, u=DRIVE, y=OUTPUT)
     assert read_recording(tmp_path / "a.npz", "u", "y").rate_hz == pytest.approx(RATE_HZ)
+
+
+@pytest.mark.parametrize("write", [np.savez, savemat])
+def test_a_rate_and_a_step_of_one_file_that_contradict_each_other_are_refused(tmp_path, write):
+    path = tmp_path / ("a.npz" if write is np.savez else "a.mat")
+    arrays = {"u": DRIVE, "y": OUTPUT, "Fs": 400.0, "dt": 0.005}
+    np.savez(path, **arrays) if write is np.savez else savemat(path, arrays)
+    told = refusal(path, "u", "y")
+    assert "two sample rates: 400 Hz (Fs = 400 Hz) and 200 Hz (dt = 0.005 s), 0.5 times as much" in told
+    assert read_recording(write_agreeing(path, arrays), "u", "y").rate_hz == 400.0
+
+
+def write_agreeing(path, arrays):
+    """The same arrays with a step that is that of the rate."""
+    arrays = {**arrays, "dt": 0.0025}
+    np.savez(path, **arrays) if path.suffix == ".npz" else savemat(path, arrays)
+    return path
+
+
+def test_an_index_into_an_array_of_words_names_what_it_holds(tmp_path):
+    np.savez(tmp_path / "a.npz", words=np.full((2, 3, N), "a"), y=OUTPUT)
+    assert "the input 'words[0, 1]' is no channel: 'words' holds text, not real numbers; save numbers" in refusal(
+        tmp_path / "a.npz", "words[0,1]", "y", RATE_HZ
+    )
+
+
+@pytest.mark.parametrize(("columns", "listed"), [(100, True), (101, False)])
+def test_an_array_has_as_many_channels_as_are_listed_and_no_more(monkeypatch, columns, listed):
+    monkeypatch.setattr("microrad.lab.recording.formats.arrays._MOST_COLUMNS", 100)
+    unusable = {}
+    found = channels_of([Variable("a", (columns, 250), np.dtype(float), lambda key: None)], unusable)
+    assert [each.name for each in found] == [f"a[{k}]" for k in range(columns)] * listed
+    assert list(unusable) == ["a"] * (not listed)

@@ -1324,3 +1324,35 @@ def test_of_models_alike_in_all_else_the_one_with_the_lower_residual_is_chosen(s
     best = 1 if scale < 1.0 else 0
     assert choose_best(fits, [[noise], [other], [3.0 * noise]]) == best
     assert choose_best(fits, [[3.0 * noise], [noise], [other]]) == 1 + best
+
+
+def test_fits_that_fail_are_told_by_model_and_progress_counts_the_starts_of_each(monkeypatch):
+    """Twelve starts of Eq. 3, and one of every other model."""
+    fails = {"prandtl_ishlinskii_rate", "prandtl_ishlinskii_creep"}
+
+    def fitted(self, model, poles, progress):
+        progress(1, 99, f"at {model}")
+        if model in fails:
+            raise IdentificationError(f"no {model}")
+        return SimpleNamespace(name=model)
+
+    monkeypatch.setattr(candidates.Candidates, "_fit", fitted)
+    given = dict.fromkeys(candidates.Candidates.__dataclass_fields__)
+    made, seen, heard = candidates.Candidates(**given), [], []
+    models = ["bouc_wen", "prandtl_ishlinskii_rate", "prandtl_ishlinskii_creep", "prandtl_ishlinskii"]
+    fits, failed = made.fit_all(models, lambda *told: seen.append(told), heard.append)
+    assert [fit.name for fit in fits] == ["bouc_wen", "prandtl_ishlinskii"] and heard == fits
+    assert [(each.model, each.reason) for each in failed] == [(m, f"no {m}") for m in models[1:3]]
+    assert seen == [
+        (1, 15, "at bouc_wen"),
+        (13, 15, "at prandtl_ishlinskii_rate"),
+        (13, 15, "prandtl_ishlinskii_rate"),
+        (14, 15, "at prandtl_ishlinskii_creep"),
+        (14, 15, "prandtl_ishlinskii_creep"),
+        (15, 15, "at prandtl_ishlinskii"),
+    ]
+    with pytest.raises(IdentificationError, match=r"^no prandtl_ishlinskii_rate$"):
+        made.fit_all(models[1:3], lambda *told: None, heard.append)
+    fails.add("bouc_wen")
+    with pytest.raises(IdentificationError, match=r"^no bouc_wen$"):
+        made.fit_all(models, lambda *told: None, heard.append)

@@ -111,3 +111,12 @@ def test_an_output_turns_by_a_quarter_at_most_in_each_unit(unit, size, options, 
     else:
         with pytest.raises(IdentificationError, match=r"^a: the output 'y' moves by "):
             check_travel([moved], unit, **options)
+
+
+@pytest.mark.parametrize("fitted", [True, False])
+def test_recordings_that_are_not_fitted_may_turn_no_farther_either(fitted):
+    loop = recording_from_arrays(WAVE, 0.1 * WAVE, 1000.0, "loop.csv")
+    far = recording_from_arrays(WAVE[1:], 0.3 * WAVE[1:], 1000.0, "far.csv")
+    given = ([loop, far], [recording_from_arrays(WAVE[2:], 0.1 * WAVE[2:], 1000.0)]) if fitted else ([loop], [far])
+    with pytest.raises(IdentificationError, match=r"^far\.csv: the output 'output' moves by 3 rad, a tilt of 3 rad"):
+        identify(given[0], validation=given[1], output_unit="rad")
