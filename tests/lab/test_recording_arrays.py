@@ -581,3 +581,11 @@ def test_what_a_check_finds_in_one_of_several_realisations_can_be_taken_on():
     found = multisine_recordings(drive, output, RATE_HZ, "bench", accept=("clipping",))
     assert [[each.kind for each in r.findings if each.refused] for r in found] == [[], ["clipping"]]
     assert [(r.path, r.period_samples) for r in found] == [("bench realisation 0", 400), ("bench realisation 1", 400)]
+
+
+def test_of_a_file_with_many_arrays_twenty_are_listed(tmp_path):
+    np.savez(tmp_path / "a.npz", **{f"c{k}": U[:, 0, 0, 0] for k in range(22)}, fs=RATE_HZ)
+    message = refusal(tmp_path / "a.npz", axes=("samples",))
+    assert "22 arrays have 1 axes, as --axes (axes) says, so which one holds the inputs is not plain" in message
+    listed = ", ".join(f"'c{k}' of shape (400,)" for k in range(20))
+    assert message.endswith(f"name it (--input). The file holds {listed}.")

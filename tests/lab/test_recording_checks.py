@@ -1766,3 +1766,30 @@ def test_an_output_may_rest_as_long_as_any_of_its_drives_does():
         assert clipping("y", 2 * resting, lambda row: f"row {row}", drives) == []
     found = clipping("y", 2 * resting, lambda row: f"row {row}", [fast, slow])
     assert [each.message.partition(":")[0] for each in found] == ["y is clipped at 1.6", "y is clipped at -1.6"]
+
+
+@pytest.mark.parametrize("offset", [1000.0, -1000.0])
+def test_a_flicker_about_an_offset_of_either_sign_is_no_excitation(offset):
+    drive = offset + 4e-3 * np.sin(2 * np.pi * 7 * TIME_S)
+    (_, moving, (found,)) = excitation([drive], ["the drive"], RATE_HZ, True)
+    assert moving == [0] and found.refused
+    assert found.message == (
+        f"the drive moves by 0.0028 rms about {offset:.6g}: that is no excitation; drive the mirror up and down"
+    )
+    assert not excitation([offset + 20 * (drive - offset)], ["the drive"], RATE_HZ, True)[2][0].refused
+
+
+@pytest.mark.parametrize("second", [True, False])
+@pytest.mark.parametrize("lags", [{50: 0.5}, {1: 0.07, 2: -0.07, 3: 0.07, 4: 0.07}])
+def test_an_output_may_follow_either_drive_late_or_by_a_little_at_several_lags(lags, second):
+    """The first shows in the correlation alone, beyond the eight lags of a prediction, and the other there alone."""
+    other, drive, output = philox(21).standard_normal((3, N))
+    for lag, gain in lags.items():
+        output += gain * np.roll(drive, lag)
+    late, _ = correlated = [_correlation([drive], output, N // 4)[1] >= 6 / math.sqrt(N), _predicts([drive], output)]
+    assert correlated == [late, not late] and late == (50 in lags)
+    flat = drive_and_output._Response(np.ones(9), np.zeros((9, 2)), np.zeros(9), np.ones((9, 2)), np.ones((9, 2)), 40.0)
+    drives = [other, drive] if second else [drive, other]
+    assert drive_and_output._unrelated("y", [*drives, output], flat, flat) == ""
+    text = drive_and_output._unrelated("y", [other, np.roll(other, 9), output], flat, flat)
+    assert text.startswith("y does not follow the drive: the coherence is at most 0, where unrelated noise reaches ")
