@@ -1793,3 +1793,23 @@ def test_an_output_may_follow_either_drive_late_or_by_a_little_at_several_lags(l
     assert drive_and_output._unrelated("y", [*drives, output], flat, flat) == ""
     text = drive_and_output._unrelated("y", [other, np.roll(other, 9), output], flat, flat)
     assert text.startswith("y does not follow the drive: the coherence is at most 0, where unrelated noise reaches ")
+
+
+def test_of_several_drives_that_all_rest_the_first_is_told_though_each_may_rest():
+    drives = np.column_stack([np.full(N, 2.5), np.full(N, -1.0)])
+    message = said(lambda: recording_from_arrays(drives, GOOD, RATE_HZ, "r", alone=False))
+    assert message.startswith("r: the input, the drive 0, is constant at 2.5, so nothing can be learnt from it; choose")
+
+
+def test_few_levels_of_an_output_are_only_noted_where_a_drive_rests():
+    """The axis that is measured may be the one that rests."""
+    moving, other = np.sin(2 * np.pi * 7.3 * TIME_S), np.cos(2 * np.pi * 11.7 * TIME_S)
+    coarse = np.round(10 * moving) / 10
+    resting = recording_from_arrays(
+        np.column_stack([moving, np.zeros(N)]), np.column_stack([moving, coarse]), RATE_HZ, "r", alone=False
+    )
+    assert [(f.output, f.refused) for f in resting.findings if f.kind == "quantisation"] == [(1, False)]
+    both = np.column_stack([moving, other])
+    with pytest.raises(RecordingError, match=r"^r: the output 1 moves in steps of 0\.1, ") as caught:
+        recording_from_arrays(both, np.column_stack([moving, coarse]), RATE_HZ, "r", alone=False)
+    assert [(f.kind, f.output) for f in caught.value.findings] == [("quantisation", 1)]

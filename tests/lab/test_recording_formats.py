@@ -2397,3 +2397,19 @@ def test_an_array_has_as_many_channels_as_are_listed_and_no_more(monkeypatch, co
     found = channels_of([Variable("a", (columns, 250), np.dtype(float), lambda key: None)], unusable)
     assert [each.name for each in found] == [f"a[{k}]" for k in range(columns)] * listed
     assert list(unusable) == ["a"] * (not listed)
+
+
+def test_a_sparse_matrix_without_rows_is_one_as_well(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["s/data"], file["u"] = DRIVE, DRIVE
+        file["s"].attrs["MATLAB_sparse"] = np.uint64(0)
+        assert unusable_dataset(tmp_path / "a.h5", file["s/data"]) == "is part of a sparse matrix; save it as full"
+        assert unusable_dataset(tmp_path / "a.h5", file["u"]) == ""
+
+
+def test_a_unit_in_bytes_is_read_as_utf_8(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["u"], file["y"] = DRIVE, OUTPUT
+        file["u"].attrs["unit"], file["y"].attrs["unit_string"] = np.bytes_(b"V"), np.bytes_("µrad".encode())
+    read = read_recording(tmp_path / "a.h5", "u", "y", RATE_HZ)
+    assert (read.input_units, read.output_units) == (("V",), ("µrad",))
