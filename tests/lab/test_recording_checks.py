@@ -10,6 +10,7 @@ from microrad.core.kernels import play_response
 from microrad.core.units import plain
 from microrad.lab.recording import (
     ACCEPTABLE,
+    Finding,
     Recording,
     RecordingError,
     check_together,
@@ -1813,3 +1814,16 @@ def test_few_levels_of_an_output_are_only_noted_where_a_drive_rests():
     with pytest.raises(RecordingError, match=r"^r: the output 1 moves in steps of 0\.1, ") as caught:
         recording_from_arrays(both, np.column_stack([moving, coarse]), RATE_HZ, "r", alone=False)
     assert [(f.kind, f.output) for f in caught.value.findings] == [("quantisation", 1)]
+
+
+def test_an_output_that_drifts_in_each_recording_follows_and_one_that_is_dead_in_each_does_not():
+    def noted(name, start, *kinds):
+        made = recording_from_arrays(SINE[start:], GOOD[start:], RATE_HZ, name)
+        return replace(made, findings=tuple(Finding(kind, "y", None, "", False, 0) for kind in kinds))
+
+    check_together([noted("a", 0, "drift"), noted("b", 1, "drift", "lead")])
+    check_together([noted("a", 0, "dead"), noted("b", 1, "drift")])
+    assert said(lambda: check_together([noted("a", 0, "drift", "dead"), noted("b", 1, "dead")])) == (
+        "a and 1 more: the output 'output' follows the drives in none of the recordings; check the sensor's wiring, or "
+        "leave it out."
+    )

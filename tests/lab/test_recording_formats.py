@@ -2413,3 +2413,19 @@ def test_a_unit_in_bytes_is_read_as_utf_8(tmp_path):
         file["u"].attrs["unit"], file["y"].attrs["unit_string"] = np.bytes_(b"V"), np.bytes_("µrad".encode())
     read = read_recording(tmp_path / "a.h5", "u", "y", RATE_HZ)
     assert (read.input_units, read.output_units) == (("V",), ("µrad",))
+
+
+@pytest.mark.parametrize("name", ["A.NPZ", "A.Mat", "A.H5"])
+def test_the_end_of_a_name_may_have_letters_of_either_case(tmp_path, name):
+    content = io.BytesIO()
+    arrays = {"drive": DRIVE, "output": OUTPUT, "fs": RATE_HZ}
+    if name == "A.NPZ":
+        np.savez(content, **arrays)
+    elif name == "A.Mat":
+        savemat(content, arrays)
+    else:
+        with h5py.File(content, "w") as file:
+            for key, values in arrays.items():
+                file[key] = values
+    (tmp_path / name).write_bytes(content.getvalue())
+    check(read_recording(tmp_path / name, "drive", "output"))
