@@ -20,6 +20,7 @@ from microrad import report
 from microrad.core.kernels import play_response
 from microrad.core.units import format_quantity
 from microrad.lab.identify import BoucWenFit, PrandtlIshlinskiiFit, Refused, identify, mirror_file_text
+from microrad.lab.identify.selection.roles import Roles
 from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, recording_from_arrays
 from microrad.mirror.hysteresis import BoucWen
@@ -37,8 +38,8 @@ from microrad.report.identification.parameters import (
     two_digits,
 )
 from microrad.report.plotting.interactive import plot_of
-from microrad.report.plotting.palette import BLUE, MOST_POINTS, SKY, VERMILION
-from microrad.report.plotting.sheet import Line, Span
+from microrad.report.plotting.palette import BLUE, MOST_POINTS, ORANGE, SKY, VERMILION
+from microrad.report.plotting.sheet import Line, Panel, Span
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ = 2000.0
@@ -1656,3 +1657,98 @@ def test_an_order_with_a_pole_that_no_recording_shows_has_no_criterion():
     score = SimpleNamespace(**of, criterion=1e12 + 30.0)
     (row,) = identification_page._scan(SimpleNamespace(scan=(score,), order=1)).rows
     assert row == ("2", "5", "0.5", "", "1 µrad", "has a pole that no recording shows")
+
+
+@pytest.mark.parametrize("chirps", [(), ("b", "c")])
+def test_the_fit_of_the_title_is_that_of_the_first_chirp_of_those_that_are_drawn(monkeypatch, chirps):
+    given = [ns(path=f"{name}.csv", sha256=name, samples=100, period_samples=None) for name in "abcdev"]
+    fits = {"a": 81.5, "b": 92.25, "c": 63.0}
+    drawn = []
+
+    def panels(places, recording, found, linear, seen):
+        drawn.append((recording.sha256, [(p.row, p.column, p.columns) for p in places], seen))
+        return fits[recording.sha256]
+
+    def sorted_by(recordings):
+        assert [r.sha256 for r in recordings] == [*"abcde"]  # what served for validation was not fitted
+        return Roles([given[1]], given[:4], given[4:5])
+
+    monkeypatch.setattr(figures, "roles", sorted_by)
+    monkeypatch.setattr(figures, "_response_panels", panels)
+    monkeypatch.setattr(figures, "is_chirp", lambda recording: recording.sha256 in chirps)
+    sources = [ns(path="v.csv", sha256="v", role="validation"), ns(path="a.csv", sha256="other", role="validation")]
+    figure = figures.time_response(ns(linear=ns(order=7), sources=sources, recordings=()), given)
+    unseen = "unseen by the linear model"
+    assert drawn == [
+        ("a", [(0, 0, 2), (1, 0, 1), (1, 1, 1)], unseen),
+        ("b", [(2, 0, 2), (3, 0, 1), (3, 1, 1)], "fitted"),
+        ("c", [(4, 0, 2), (5, 0, 1), (5, 1, 1)], unseen),
+    ]
+    said = "Time response to the chirp, fit 92.25 %" if chirps else "Time response of the linear part, fit 81.50 %"
+    assert figure.title == said
+    assert figure.caption.startswith("Output of the broadband recordings and of the linear model of order 7.")
+    assert (figure.sheet.height, figure.sheet.heights) == (12.5, (1.0,) * 6)
+
+
+@pytest.mark.parametrize("chirped", [False, True])
+def test_a_time_response_starts_at_rest_and_shows_its_beginning_and_its_last_fifth(monkeypatch, chirped):
+    """The error of the model is shorter than the record, and drive and output are in units of their own."""
+    count, kept, rate_hz = 2000, 1600, 50.0
+    drive = 3.0 + np.r_[0.0, philox(5).standard_normal(count - 1)]
+    output = 0.5 * drive + 4.0
+    recording = recording_from_arrays(drive, output, rate_hz, "/there/some chirp.csv")
+    error = 1e-6 * np.where(np.arange(kept) % 2, 0.25, -0.25)[:, None]
+    seen = []
+
+    def left(modes, scaled, hold):
+        seen.append((modes, hold, scaled))
+        return error
+
+    monkeypatch.setattr(figures, "axis_error", left)
+    monkeypatch.setattr(figures, "is_chirp", lambda one: chirped)
+    found = ns(units=ns(volts=10.0, radians=2e-6))
+    panels = [Panel(0, 0) for _ in range(3)]
+    fit = figures._response_panels(panels, recording, found, ns(modes="modes", hold="first-order"), "fitted")
+    ((modes, hold, scaled),) = seen
+    assert (modes, hold) == ("modes", "first-order")
+    np.testing.assert_allclose(scaled.drive[:, 0], 10.0 * (drive - 3.0))
+    y = 2e-6 * (output[:kept] - output[:kept].mean())
+    percent = 100.0 * (1.0 - np.linalg.norm(error[:, 0]) / np.linalg.norm(y))
+    assert fit == pytest.approx(percent, rel=1e-9)  # sums in another order
+    whole, early, late = panels
+    assert whole.title == f"some chirp.csv: fit {percent:.2f} % (fitted)"
+    time, e = np.arange(kept) / rate_hz, error[:, 0]
+    first = slice(0, 400 if chirped else 300)
+    for panel, curves in (
+        (whole, [(time, y, "measured", BLUE), (time, e, "measured less modelled", ORANGE)]),
+        (early, [(time[first], y[first], "measured", BLUE), (time[first], (y - e)[first], "linear model", VERMILION)]),
+        (
+            late,
+            [
+                (time[1280:1580], y[1280:1580], "measured", BLUE),
+                (time[1280:1580], (y - e)[1280:1580], "linear model", VERMILION),
+            ],
+        ),
+    ):
+        lines = panel.all_of(Line)
+        assert [(line.label, line.colour) for line in lines] == [curve[2:] for curve in curves]
+        for line, (x, values, *_) in zip(lines, curves, strict=True):
+            np.testing.assert_allclose(line.x, x)
+            np.testing.assert_allclose(line.y, 1e6 * values, atol=1e-9)
+        assert (panel.x.title, panel.y.title) == ("time (s)", "output (µrad)")
+    assert (whole.legend is None, early.legend is None, late.legend) == (False, False, None)
+
+
+def test_each_figure_counts_the_recordings_that_it_leaves_out_of_its_own_only():
+    one, other = two_recordings()
+    unjudged = replace(one, prediction=None, role="broadband")
+    everything = [unjudged, *[one, other] * 7, unjudged]  # fourteen with a prediction, sixteen in all
+    found = ns(chosen="linear", linear=None)
+    for figure, count, panels in (
+        (figures.loops(everything, found), 2, 24),
+        (figures.residuals(everything), 2, 12),
+        (figures.excitation(everything, found), 4, 24),
+    ):
+        assert figure.caption.endswith(f". {count} more recordings are not drawn.")
+        assert len(figure.sheet.panels) == panels
+    assert not figures.loops(everything[:13], found).caption.endswith("not drawn.")

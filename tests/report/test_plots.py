@@ -1173,3 +1173,71 @@ def test_given_axes_in_rows_and_columns_are_taken_row_by_row():
     axes_of(sheet, given)
     assert [[ax.get_title() for ax in row] for row in given] == [["panel 0", "panel 1"], ["panel 2", "panel 3"]]
     pyplot.close("all")
+
+
+def unlike(shape):
+    """A number for each element, none a multiple of its row or column."""
+    return (1.0 + np.arange(np.prod(shape)) ** 2).reshape(shape)
+
+
+def test_each_pair_of_output_and_input_has_a_confidence_of_its_own():
+    outputs, inputs = ("tip", "tilt"), ("left", "right", "rear")
+    of = unlike((2, 3))
+    found = SimpleNamespace(
+        freq_hz=np.array([1.0, 3.0]),
+        response=100.0 * np.array([1.0, 2.0j])[:, None, None] * np.ones((2, 3)),
+        standard_error=np.array([1.0, 1.5])[:, None, None] * of,
+        output_names=outputs,
+        input_names=inputs,
+    )
+    sheet = plots._measured_bode(found)
+    sizes = [panel for panel in sheet.panels if panel.row % 2 == 0]
+    assert [panel.title for panel in sizes] == [f"{o} from {i}" for o in outputs for i in inputs]
+    for panel, error in zip(sizes, of.ravel(), strict=True):
+        (ring,) = panel.all_of(Area)[0].rings
+        half = 1.96 / math.sqrt(2.0) * error
+        assert ring[2:, 1] == pytest.approx([200.0 + 1.5 * half, 100.0 + half])
+
+
+def test_a_fit_of_two_outputs_and_three_inputs_has_table_model_and_band_of_each_pair(monkeypatch):
+    monkeypatch.setattr(plots, "_FINE", 2)
+    of, freq = unlike((2, 3)), np.array([1.0, 4.0])
+
+    def grows(at, scale):
+        return scale * np.atleast_1d(at)[:, None, None] * of
+
+    fit = SimpleNamespace(
+        freq_hz=freq,
+        residual=grows(freq, 0.5),
+        response=lambda at: grows(at, 1.0),
+        response_errors=lambda at: (grows(at, 0.1), grows(at, 0.01) / of**0.5),
+        order=2,
+    )
+    sheet = plots._fit_bode(fit)
+    assert (sheet.width, sheet.height) == (pytest.approx(10.2), pytest.approx(9.2))
+    for number, value in enumerate(of.ravel()):
+        size, phase = sheet.panels[2 * number : 2 * number + 2]
+        row, column = divmod(number, 3)
+        assert (size.row, size.column, phase.row, phase.column) == (2 * row, column, 2 * row + 1, column)
+        assert size.title == f"output {row + 1} from input {column + 1}"
+        table, model = size.all_of(Line)
+        assert [*table.y, *model.y] == pytest.approx([1.5 * value, 6.0 * value, value, 4.0 * value])
+        (ring,) = size.all_of(Area)[0].rings
+        assert ring[0, 1] == pytest.approx(value * (1.0 - 0.196))
+        (ring,) = phase.all_of(Area)[0].rings
+        assert ring[0, 1] == pytest.approx(-np.degrees(1.96 * 0.01 * value**0.5))
+
+
+def test_the_residuals_of_three_outputs_and_two_inputs_stand_output_by_output():
+    of, freq = unlike((3, 2)), np.array([1.0, 4.0])
+    residual = -0.25 * freq[:, None, None] * of
+    fit = SimpleNamespace(freq_hz=freq, residual=residual, response=lambda at: at[:, None, None] * of)
+    sheet = plots._fit_residual(fit)
+    assert (sheet.width, sheet.height, sheet.share_x) == (6.8, 9.0, True)
+    assert [(panel.row, panel.column, panel.title) for panel in sheet.panels] == [
+        (row, column, f"output {row + 1} from input {column + 1}") for row in range(3) for column in range(2)
+    ]
+    for panel, value in zip(sheet.panels, of.ravel(), strict=True):
+        table, left = panel.all_of(Line)
+        assert [*table.y, *left.y] == pytest.approx([0.75 * value, 3.0 * value, 0.25 * value, value])
+    assert [panel.legend is not None for panel in sheet.panels] == [True] + [False] * 5

@@ -1517,3 +1517,24 @@ def test_light_on_a_tracking_sensor_has_its_angle_where_there_is_one():
         **base,
         "noise_equivalent_angle_rad": None,
     }
+
+
+def test_a_verdict_names_each_requirement_that_is_missed_and_none_where_a_link_does_not_close(plain, monkeypatch):
+    asked = [
+        Requirement("beacon", "beacon coverage", "%", 99.0, 90.0, -9.0, "the cone"),
+        Requirement("answer", "answer margin", "dB", 3.0, 4.0, 1.0, "power"),
+        Requirement("communication", "communication margin", "dB", 3.0, 9.0, 6.0, "power", unknown="an aperture"),
+    ]
+    monkeypatch.setattr(links_words, "of_links", lambda study: asked)
+    margins = (3.25, -0.5, 12.0)
+    budgets = [
+        SimpleNamespace(name=name, margin_db=db)
+        for name, db in zip(("Communication", "Beacon", "Answer"), margins, strict=True)
+    ]
+    told = "communication +3.25 dB, beacon \u22120.50 dB, answer +12.00 dB."
+    study = SimpleNamespace(budgets=budgets, file=plain.file, closes=True)
+    missed = "beacon coverage and communication margin"
+    assert links_words.verdict(study) == f"Not every requirement is met: {missed}; {told}"
+    del asked[0]
+    assert links_words.verdict(study) == f"Not every requirement is met: communication margin; {told}"
+    assert links_words.verdict(SimpleNamespace(**{**vars(study), "closes": False})) == f"The links do not close: {told}"
