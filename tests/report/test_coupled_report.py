@@ -27,6 +27,7 @@ from microrad.report.identification import coupled as coupled_page
 from microrad.report.identification import coupled_figures as coupled_figures_module
 from microrad.report.identification import coupled_words as words
 from microrad.report.identification.coupled_figures import MOST, bands, coupled_figures, error_over_parameters
+from microrad.report.identification.page import BEGINS
 from microrad.report.identification.terminal import MOST_LINES
 from microrad.report.plotting.sheet import Area, Line, Rule, Span
 from microrad.report.tables import Cell
@@ -1122,3 +1123,26 @@ def test_one_drive_of_many_outputs_is_told_in_the_singular():
     model = SimpleNamespace(outputs=[None] * (MOST + 2), actuators=[None])
     said = coupled_figures_module._left_out(SimpleNamespace(candidate=lambda: SimpleNamespace(model=model)))
     assert said == f" Of {MOST + 2} outputs and 1 drive the first {MOST} are drawn."
+
+
+@pytest.mark.parametrize("virtual", [False, True])
+def test_a_page_of_several_channels_has_all_that_is_given_and_spares_a_file_that_appears(
+    monkeypatch, tmp_path, virtual
+):
+    target, seen = tmp_path / "r.html", []
+
+    def page(found, **given):
+        seen.append((found, given))
+        if virtual:
+            target.write_text(BEGINS + "first", encoding="utf-8")
+        return BEGINS + "new"
+
+    monkeypatch.setattr(coupled_page, "coupled_identification_page", page)
+    given = {"mirror_file": Path("m.toml"), "mirror_text": "text", "title": "A title", "virtual": virtual}
+    if virtual:
+        with pytest.raises(report.ReportError, match=r"r\.html exists and is left as it is"):
+            coupled_page.write_coupled_identification("found", target, **given)
+    else:
+        assert coupled_page.write_coupled_identification("found", target, **given) == target
+    assert seen == [("found", given)]
+    assert target.read_text("utf-8") == BEGINS + ("first" if virtual else "new")

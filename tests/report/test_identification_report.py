@@ -1752,3 +1752,52 @@ def test_each_figure_counts_the_recordings_that_it_leaves_out_of_its_own_only():
         assert figure.caption.endswith(f". {count} more recordings are not drawn.")
         assert len(figure.sheet.panels) == panels
     assert not figures.loops(everything[:13], found).caption.endswith("not drawn.")
+
+
+@pytest.mark.parametrize(
+    ("there", "overwrite", "said"),
+    [
+        (BEGINS + "first", False, r"r\.html exists and is left as it is; name another file, or replace it with --over"),
+        ("mine", True, r"r\.html is not a report that microrad identify wrote and is left as it is; name another file"),
+    ],
+)
+def test_a_file_that_appears_while_the_page_is_made_is_left_alone(monkeypatch, tmp_path, there, overwrite, said):
+    target = tmp_path / "r.html"
+
+    def page(found, **given):
+        target.write_text(there, encoding="utf-8")
+        return BEGINS + "new"
+
+    monkeypatch.setattr(identification_page, "identification_page", page)
+    given = {"mirror_file": Path("m.toml"), "mirror_text": "", "title": "T", "overwrite": overwrite}
+    with pytest.raises(report.ReportError, match=said):
+        report.write_identification(ns(chosen="linear"), target, **given)
+    assert text_of(target) == there
+
+
+def test_a_link_to_nothing_is_no_report_and_is_not_followed(monkeypatch, tmp_path):
+    target = tmp_path / "r.html"
+    try:
+        target.symlink_to(tmp_path / "nothing.html")
+    except OSError:
+        pytest.skip("links cannot be made here")
+    with pytest.raises(report.ReportError, match=r"r\.html is not a report that microrad identify wrote"):
+        identification_page.check_identification(target, True)
+    assert target.is_symlink() and not (tmp_path / "nothing.html").exists()
+
+
+@pytest.mark.parametrize("written", [None, "bouc_wen"])
+def test_a_page_is_made_of_all_that_is_given_with_the_choice_where_no_model_is_named(monkeypatch, tmp_path, written):
+    seen, found = [], ns(chosen="linear")
+
+    def page(found, **given):
+        seen.append((found, given))
+        return BEGINS + "new"
+
+    monkeypatch.setattr(identification_page, "identification_page", page)
+    given = {"mirror_file": Path("m.toml"), "mirror_text": "text", "title": "A title"}
+    more = {"recordings": ("one", "two"), "virtual": True} if written else {}
+    path = report.write_identification(found, tmp_path / "r.html", **given, written=written, **more)
+    assert (path, text_of(path)) == (tmp_path / "r.html", BEGINS + "new")
+    all_of_it = {"written": "linear", "recordings": (), "virtual": False, **more}
+    assert seen == [(found, given | all_of_it | ({"written": written} if written else {}))]

@@ -29,9 +29,12 @@ from microrad.loop import disturbance
 from microrad.loop.control import AxisController, Drive, Timing
 from microrad.loop.disturbance import Disturbance, Reference, SpectralLine
 from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.paper_cases import Run
 from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.pointing_loop.traces import PointingTrace
 from microrad.loop.sensor import OpticalSensor
+from microrad.loop.sine_run import Trace
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.report import plots
@@ -1241,3 +1244,38 @@ def test_the_residuals_of_three_outputs_and_two_inputs_stand_output_by_output():
         table, left = panel.all_of(Line)
         assert [*table.y, *left.y] == pytest.approx([0.75 * value, 3.0 * value, 0.25 * value, value])
     assert [panel.legend is not None for panel in sheet.panels] == [True] + [False] * 5
+
+
+def test_lines_alone_are_marked_and_have_no_curve_of_a_spectrum():
+    none = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
+    lines = SpectralLine(2e-6, 40.0), SpectralLine(1e-6, 7.0)
+    left, right = plots._disturbance_spectrum(Disturbance("hum", *none, lines, "assumed", "a test")).panels
+    assert [(type(mark), mark.at) for mark in left.marks] == [(Rule, 40.0), (Rule, 7.0)]
+    (below,) = right.marks
+    assert below.x[[0, -1]] == pytest.approx([7.0 / 30.0, 1200.0]) and below.name == "hum"
+    at = np.searchsorted(below.x, [6.5, 7.5, 41.0])
+    assert below.y[at] == pytest.approx([0.0, math.sqrt(0.5), math.sqrt(2.5)])  # amplitudes over the root of two
+
+
+def test_each_kind_of_run_has_the_error_of_its_own_steady_part():
+    error = 1e-6 * np.array([[40.0], [3.0], [3.0], [3.0]])
+    reference = 1e-6 * np.array([[1.0], [2.0], [4.0], [8.0]])
+    trace = made(
+        Trace, time_s=np.arange(4.0), reference_rad=reference, output_rad=reference - error, steady=slice(1, None)
+    )
+    run = made(Run, trace=trace)
+    moving = made(PointingTrace, time_s=np.arange(4.0), error_rad=error)
+    for result, label, shaded in ((trace, "3.00", 1), (run, "3.00", 1), (moving, "20.2", 0)):
+        ax = plots.plot_residual(result)
+        assert [line.get_label() for line in ax.lines] == [f"axis 1: rms {label} µrad"]
+        assert len(ax.patches) == shaded
+        assert_allclose(ax.lines[0].get_xydata(), np.c_[np.arange(4.0), 1e6 * error[:, 0]])
+    pyplot.close("all")
+
+
+def made(kind, **values):
+    """A record of a kind with these fields alone."""
+    found = object.__new__(kind)
+    for name, value in values.items():
+        object.__setattr__(found, name, value)
+    return found

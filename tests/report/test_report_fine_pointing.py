@@ -2361,3 +2361,19 @@ def test_an_inverse_in_series_is_drawn_before_the_lowest_in_theory(fine):
     lowest = replace(third, theory=SimpleNamespace(radial_rms_rad=0.0))
     best = replace(fine, verified=(first, second, lowest), best=first)
     assert [each.name for each in figures.shown(best)] == [controller_study.BASELINE, SECOND, THIRD]
+
+
+def test_parameters_have_their_units_alone_and_by_loop_but_for_controllers_that_a_plant_cannot_have(monkeypatch):
+    def family(**units):
+        parameters = [SimpleNamespace(name=name, unit=unit) for name, unit in units.items()]
+        return SimpleNamespace(parameters=lambda plant: parameters if plant == "plant" else [])
+
+    def refused(plant):
+        raise ValueError("no resonance")
+
+    given = [family(gain="", corner="Hz"), SimpleNamespace(parameters=refused), family(lag="s")]
+    monkeypatch.setattr(plain_data, "families", lambda table: given if table == "table" else [])
+    monkeypatch.setattr(plain_data, "H_INFINITY_OF_AXES", family(weight="rad/s"))
+    units = plain_data.parameter_units(SimpleNamespace(one_axis="plant", table="table"))
+    names = {"gain": "", "corner": "Hz", "lag": "s", "weight": "rad/s"}
+    assert units == {f"{name}{of}": unit for name, unit in names.items() for of in ("", " x", " y", " 1", " 2")}
