@@ -40,6 +40,7 @@ from microrad.report.identification.parameters import (
 from microrad.report.plotting.interactive import plot_of
 from microrad.report.plotting.palette import BLUE, MOST_POINTS, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import Line, Panel, Span
+from microrad.report.tables import Table
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ = 2000.0
@@ -1801,3 +1802,55 @@ def test_a_page_is_made_of_all_that_is_given_with_the_choice_where_no_model_is_n
     assert (path, text_of(path)) == (tmp_path / "r.html", BEGINS + "new")
     all_of_it = {"written": "linear", "recordings": (), "virtual": False, **more}
     assert seen == [(found, given | all_of_it | ({"written": written} if written else {}))]
+
+
+def test_a_phase_is_found_where_the_model_is_nothing():
+    (size, phase), freq = (Panel(0, 0), Panel(1, 0)), np.array([1.0, 10.0, 100.0])
+    model = figures.Modelled(freq, np.array([1.0, 0.0, -1.0], dtype=complex), "a model")
+    figures.bode((size, phase), figures.Measured(freq, np.array([1.0, 2.0j, -1.0])), model)
+    measured, modelled = phase.all_of(Line)
+    np.testing.assert_allclose([measured.y, modelled.y], [[0.0, 90.0, 180.0], [0.0, 0.0, 180.0]], atol=1e-9)
+    assert (phase.y.low, phase.y.high) == (pytest.approx(-20.0), pytest.approx(200.0))
+    np.testing.assert_allclose([line.y for line in size.all_of(Line)], [[1.0, 2.0, 1.0], [1.0, 0.0, 1.0]])
+
+
+def test_a_recording_is_known_by_its_file_and_its_bytes():
+    kept = [ns(path="a.csv", sha256="1"), ns(path="b.csv", sha256="2")]
+    changed, moved = ns(path="a.csv", sha256="3"), ns(path="c.csv", sha256="2")
+    again = ns(path="b.csv", sha256="2")
+    assert words.shown_recordings(ns(recordings=kept), [changed, again, moved]) == [changed, moved]
+
+
+def test_warnings_are_those_of_the_model_that_is_written_each_once_and_without_its_range_where_the_verdict_has_it(
+    monkeypatch,
+):
+    monkeypatch.setattr(words, "fit_warnings", lambda fit: [f"of {fit}", "short"])
+    monkeypatch.setattr(words, "range_warnings", lambda drives, rate: [f"from {drives} at {rate}"])
+    found = ns(
+        warnings=("short", "from (-1.0, 4.0) at 7.0", "of linear"),
+        fit=lambda model: model or "linear",
+        drive_min_v=-1.0,
+        drive_max_v=4.0,
+        rate_limit_v_per_s=7.0,
+    )
+    assert words.warnings(found) == ["short", "from (-1.0, 4.0) at 7.0", "of linear"]
+    assert words.warnings(found, "plays") == ["short", "from (-1.0, 4.0) at 7.0", "of linear", "of plays"]
+    assert words.pressing(found, "plays") == ["short", "of linear", "of plays"]
+
+
+def test_a_terminal_has_seven_rows_of_poles_and_the_delay_without_notes(monkeypatch):
+    names = ["alpha", *(f"pole {k}" for k in range(1, 7)), "delay", "pole 7", "zero 1"]
+    rows = [(name, f"{k}", f"{k}.5", "Hz", "a note") for k, name in enumerate(names)]
+    made_of = []
+
+    def model(fit):
+        made_of.append(fit)
+        return Table("", ("parameter", "value", "± standard error", "unit", "note"), rows, (0, 3, 4))
+
+    monkeypatch.setattr(identification_page, "_model", model)
+    (table,) = identification_page._poles(ns(fit=lambda written: written), "bouc_wen")
+    assert made_of == ["bouc_wen"]
+    assert [tuple(map(str, row)) for row in table.rows] == [row[:4] for row in rows[1:8]]
+    assert [*table.headings] == ["parameter", "value", "± standard error", "unit"]
+    rows[1:9] = []
+    assert identification_page._poles(ns(fit=lambda written: written), "bouc_wen") == []

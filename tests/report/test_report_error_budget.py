@@ -833,3 +833,21 @@ def test_a_requirement_says_of_what_its_share_is(interpretation, confidence, axe
 
 def test_how_much_larger_a_source_may_be_has_no_power_of_ten():
     assert budget_words.allowed(SimpleNamespace(allowed=1234.0)) == "1230 times"
+
+
+def test_requirements_of_one_window_share_it_and_those_without_a_window_have_none():
+    def one(name, *index):
+        return SimpleNamespace(name=name, total=SimpleNamespace(required=SimpleNamespace(index=ErrorIndex(*index))))
+
+    judged = [
+        one("code_word", "RPE", 0.01),
+        one("whole", "APE"),
+        one("slow_drift", "PDE", 0.01, 60.0),
+        one("frame_of_it", "RPE", 0.01),
+        one("image", "RPE", 0.02),
+    ]
+    assert list(figures._windows(judged).items()) == [
+        (ErrorIndex("RPE", 0.01), "code word, frame of it"),
+        (ErrorIndex("PDE", 0.01, 60.0), "slow drift"),
+        (ErrorIndex("RPE", 0.02), "image"),
+    ]

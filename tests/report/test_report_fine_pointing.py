@@ -32,7 +32,7 @@ from microrad.report.fine_pointing import figures, simulated_windows, tails, win
 from microrad.report.fine_pointing import page as section
 from microrad.report.fine_pointing import recording as recorded
 from microrad.report.fine_pointing.figures import fine_pointing_figures
-from microrad.report.plotting.sheet import Panel, Rule
+from microrad.report.plotting.sheet import Line, Panel, Rule
 from microrad.report.requirements import requirement_table
 from microrad.report.results.arrays import study_netcdf
 from microrad.report.results.manifest import manifest_of
@@ -2377,3 +2377,47 @@ def test_parameters_have_their_units_alone_and_by_loop_but_for_controllers_that_
     units = plain_data.parameter_units(SimpleNamespace(one_axis="plant", table="table"))
     names = {"gain": "", "corner": "Hz", "lag": "s", "weight": "rad/s"}
     assert units == {f"{name}{of}": unit for name, unit in names.items() for of in ("", " x", " y", " 1", " 2")}
+
+
+def test_the_spectra_of_a_loop_are_those_of_its_first_axis_controller_by_controller():
+    """Two controllers on five frequencies, the second axis far quieter, the wheels' lines about that axis alone."""
+    freq = np.array([0.0, 10.0, 20.0, 30.0, 40.0])
+    before = 1e-12 * np.array([900.0, 70.0, 60.0, 50.0, 900.0])
+
+    def controller(name, after, predicted):
+        both = [1e-12 * np.c_[values, 1e-6 * np.array(values)] for values in (after, predicted)]
+        return ns(design=ns(name=name), spectrum_rad2_hz=both[0], predicted_rad2_hz=both[1])
+
+    plain = controller("plain", [900.0, 4.0, 5.0, 7.0, 1e-9], [900.0, 3.0, 2.0, 1.0, 900.0])
+    best = controller("best", [900.0, 0.25, 0.75, 0.035, 1e-9], [900.0, 0.5, 0.125, 0.375, 900.0])
+    loop = ns(
+        optical=ns(noise_rad=3e-7, every=4), timing=ns(period_s=1e-3), disturbances=[[ns(lines=())], [ns(lines=(1,))]]
+    )
+    fine = ns(freq_hz=freq, disturbed_rad2_hz=before, scene=ns(loop=loop))
+    shown = tuple(figures.Shown(of, *look) for of, look in ((plain, ("#111111", "o")), (best, ("#222222", "s"))))
+    figure = figures.spectra(fine, shown)
+    left, right = figure.sheet.panels
+    assert [(line.label or line.name, line.colour, [*line.y.round(6)]) for line in left.all_of(Line)] == [
+        ("before the loop", "#000000", [70.0, 60.0, 50.0]),
+        ("plain", "#111111", [4.0, 5.0, 7.0]),
+        ("plain, predicted, linear", "#111111", [3.0, 2.0, 1.0]),
+        ("best", "#222222", [0.25, 0.75, 0.035]),
+        ("best, predicted, linear", "#222222", [0.5, 0.125, 0.375]),
+        ("dashed: predicted, linear", "#777777", []),
+    ]
+    gathered = [("plain", (4.0, 9.0, 16.0)), ("plain, predicted, linear", (3.0, 5.0, 6.0))]
+    gathered += [("best", (0.25, 1.0, 1.035)), ("best, predicted, linear", (0.5, 0.625, 1.0))]
+    for line, (name, sums) in zip(right.all_of(Line), gathered, strict=True):
+        assert (line.label or line.name) == name
+        assert_allclose(line.y, np.sqrt(10.0 * np.array(sums)), rtol=1e-9)
+    assert [rule.at for rule in left.all_of(Rule)] == [pytest.approx(2.0 * 0.09 * 4e-3)]
+    assert left.y.low == pytest.approx(0.01)  # a power of ten below the least that is left
+    assert figure.caption.endswith(" Lines of the reaction wheel are not in the spectrum before the loop.")
+    assert {name: [*np.round(1e12 * np.asarray(of), 6)] for name, of in figure.columns.items()} == {
+        "frequency (Hz)": [1e13, 2e13, 3e13],
+        "before the loop (rad^2/Hz)": [70.0, 60.0, 50.0],
+        "plain, simulated (rad^2/Hz)": [4.0, 5.0, 7.0],
+        "plain, predicted (rad^2/Hz)": [3.0, 2.0, 1.0],
+        "best, simulated (rad^2/Hz)": [0.25, 0.75, 0.035],
+        "best, predicted (rad^2/Hz)": [0.5, 0.125, 0.375],
+    }
