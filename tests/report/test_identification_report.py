@@ -1854,3 +1854,40 @@ def test_a_terminal_has_seven_rows_of_poles_and_the_delay_without_notes(monkeypa
     assert [*table.headings] == ["parameter", "value", "± standard error", "unit"]
     rows[1:9] = []
     assert identification_page._poles(ns(fit=lambda written: written), "bouc_wen") == []
+
+
+def test_the_axis_of_poles_holds_the_lowest_and_the_highest_of_poles_zeros_and_band():
+    for poles, zeros, ends in (([-15.0, -30.0], [2.0], (0.6, 90.0)), ([-3.0, -15.0], [12.0, 50.0], (0.9, 150.0))):
+        linear = a_linear(np.array(poles) + 0j, [1.0, 2.0], np.array(zeros) + 0j)
+        (panel,) = figures.poles(linear).sheet.panels
+        assert (panel.x.low, panel.x.high) == (pytest.approx(ends[0]), pytest.approx(ends[1]))
+
+
+def test_recordings_are_drawn_in_volts_and_radians_with_what_each_served_for():
+    """Two that were judged, then those that were given besides, of which one served for nothing."""
+
+    def recording(path, sha256, scale):
+        drive = scale * np.array([[0.0], [1.0], [-1.0], [3.0]])
+        return ns(path=path, sha256=sha256, drive=drive, output=7.0 * drive, rate_hz=2.0 * scale)
+
+    one, two = recording("/in/one.csv", "1", 1.0), recording("/in/two.csv", "2", 2.0)
+    wide, other = recording("/in/wide.csv", "3", 4.0), recording("/in/one.csv", "9", 8.0)
+    roles = {("/in/two.csv", "2"): "validation", ("/in/one.csv", "1"): "loops", ("/in/wide.csv", "3"): "broadband"}
+    found = ns(
+        units=ns(volts=10.0, radians=1e-6),
+        recordings=[one, two],
+        scores=[ns(model="plays"), ns(model="linear")],
+        predictions=[("not", "these"), ("first", "second")],
+        chosen="linear",
+        sources=[ns(path=path, sha256=sha256, role=role) for (path, sha256), role in roles.items()],
+    )
+    made = figures.shown(found, [wide, two, other])
+    assert [(each.name, each.role, each.prediction, each.rate_hz) for each in made] == [
+        ("one.csv", "loops", "first", 2.0),
+        ("two.csv", "validation", "second", 4.0),
+        ("wide.csv", "broadband", None, 8.0),
+        ("one.csv", "not used", None, 16.0),
+    ]
+    assert [each.drive_v.tolist() for each in made] == [[0.0, 10.0 * k, -10.0 * k, 30.0 * k] for k in (1, 2, 4, 8)]
+    np.testing.assert_allclose(made[1].output_rad, 14e-6 * np.array([0.0, 1.0, -1.0, 3.0]))
+    assert made[2].time_s.tolist() == [0.0, 0.125, 0.25, 0.375]
