@@ -47,7 +47,7 @@ from microrad.report.plotting import palette
 from microrad.report.quantities import apart, quantity
 from microrad.report.study.page import cost_view
 from microrad.report.tables import Table
-from microrad.report.view import Soft, views_text
+from microrad.report.view import Soft, View, views_text
 from microrad.studio.views import pointing as pointing_pages
 from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
@@ -1538,3 +1538,98 @@ def test_a_verdict_names_each_requirement_that_is_missed_and_none_where_a_link_d
     del asked[0]
     assert links_words.verdict(study) == f"Not every requirement is met: communication margin; {told}"
     assert links_words.verdict(SimpleNamespace(**{**vars(study), "closes": False})) == f"The links do not close: {told}"
+
+
+def test_two_budgets_have_the_totals_of_the_first_and_then_those_that_only_the_second_has():
+    def line(name, value, basis="b", source="s", regime="r", warning=""):
+        return Line(name, value, "dB", basis, source, regime, warning)
+
+    one = SimpleNamespace(
+        name="Answer",
+        lines=(line("Gain", 3.0), line("Loss", -1.0, regime="far", warning="near")),
+        totals=(line("Sum", 2.0), line("Left", 0.5)),
+        margin_db=0.5,
+    )
+    two = SimpleNamespace(
+        name="Answer",
+        lines=(line("Gain", 4.0, source="t"), line("Loss", -2.0, basis="c", warning="near")),
+        totals=(line("More", 7.0), line("Sum", 2.5, basis="d")),
+        margin_db=-7.0,
+    )
+    (table,) = paired_tables(one, two, NAMES)
+    assert [tuple(map(str, row)) for row in table.rows] == [
+        ("Gain", "3.00 dB", "4.00 dB", "b", "s\nsimulated: t", "r"),
+        ("Loss !", "\u22121.00 dB", "\u22122.00 dB", "b\nsimulated: c", "s", "far\nsimulated: r"),
+        ("Sum", "2.00 dB", "2.50 dB", "b\nsimulated: d", "s", "r"),
+        ("Left", "0.50 dB", "", "b", "s", "r"),
+        ("More", "", "7.00 dB", "b", "s", "r"),
+    ]
+    assert (table.rows[1][0].mark, table.rows[1][0].hint) == ("!", "near")
+    assert (table.totals, table.title, table.headings) == (
+        3,
+        "Answer",
+        ("line", *NAMES, "basis", "source", "holds for"),
+    )
+    assert table.folded == "Answer: margin 0.50 dB as budgeted, \u22127.00 dB simulated"
+    names = ["lines.Gain", "lines.Loss", "totals.Sum", "totals.Left", "totals.More"]
+    for column in (1, 2):
+        assert [table.name(row, column) for row in range(5)] == [f"budgets.Answer.{name}.value" for name in names]
+
+
+def test_the_first_doubt_of_fades_is_told_and_a_case_without_a_controller_by_its_source():
+    def fades(source, controller, warning, per_s=3.0):
+        return SimpleNamespace(
+            source=source, controller=controller, fade_warning=warning, fades_per_s=per_s, fade_s=2e-3
+        )
+
+    cases = [
+        fades("a file", "", "", math.nan),
+        fades("the jitter", "", ""),
+        fades("the loop", "PI", "too few samples"),
+        fades("the loop", "PID", "another"),
+    ]
+    each = "3 a second of 2 ms each"
+    assert fade_sentences(cases) == [
+        "Fades below the required margin, for Gaussian errors of that rms and spectrum: "
+        f"the jitter: {each}; PI: {each}; PID: {each}.",
+        "Too few samples.",
+    ]
+    assert fade_sentences(cases[:2])[1:] == []
+
+
+def test_a_page_of_links_has_what_was_solved_for_ahead_of_the_budgets_and_a_standard_behind_them(plain, monkeypatch):
+    of_figures = []
+    monkeypatch.setattr(link_module, "link_figures", lambda study: [SimpleNamespace(static="a static picture")])
+
+    def views(study, figures):
+        of_figures.append((study, figures))
+        return (View("Link budgets", ["the budgets"]),)
+
+    monkeypatch.setattr(links, "links_views", views)
+    monkeypatch.setattr(links, "standard_view", lambda against: View(f"Held against {against}", ["each clause"]))
+    solved = variation.Solved((CLOSED,), (1.0, 5.0), 3.0, 7.0)
+    solution = link_study.Solution("answer.power", "W", "answer", 3.0, solved, 2.0, None)
+    said = links_words.solution_text(solution)
+    for given, has in (((), (0, 0)), ((solution,), (1, 0)), ((None, "a standard"), (0, 1)), ((solution, "a"), (1, 1))):
+        page = without_scripts(links_page(plain, *given))
+        assert (page.count(said), page.count("each clause")) == has
+        places = [page.index(each) for each in (said, "the budgets", "each clause") if each in page]
+        assert places == sorted(places) and len(places) == 1 + sum(has)
+    assert of_figures == [(plain, ["a static picture"])] * 4
+
+
+@pytest.mark.parametrize(
+    ("rate_bit_s", "said"),
+    [
+        (622.4e6, "622"),
+        (-622.4e6, "\u2212622"),
+        (10.4e6, "10"),
+        (9.96e6, "10"),
+        (-9.94e6, "\u22129.9"),
+        (1.25e6, "1.2"),
+        (-125e3, "\u22120.12"),
+        (0.0, "0"),
+    ],
+)
+def test_a_rate_is_whole_from_ten_megabits_on_whichever_its_sign(rate_bit_s, said):
+    assert links._mbit_s(rate_bit_s) == said
