@@ -1146,3 +1146,78 @@ def test_a_page_of_several_channels_has_all_that_is_given_and_spares_a_file_that
         assert coupled_page.write_coupled_identification("found", target, **given) == target
     assert seen == [("found", given)]
     assert target.read_text("utf-8") == BEGINS + ("first" if virtual else "new")
+
+
+def by_hand_of_floors():
+    """Three amplitudes: without noise of its own, without a response, and with both; all numbers unlike."""
+
+    def response(power, share):
+        power = np.array(power)
+        error = np.stack([np.array([[2.0, 5.0]] * 3), np.array([[7.0, 11.0]] * 3)], axis=2)
+        noise = None if share is None else error * np.array([share, [0.1, 0.9]]).T
+        return SimpleNamespace(
+            freq_hz=np.array([1.0, 2.0, 3.0]),
+            residual_power=power,
+            standard_error=error,
+            noise_standard_error=noise,
+        )
+
+    return SimpleNamespace(
+        amplitudes_v=np.array([0.1, 0.2, 0.4]),
+        bands_hz=np.array([1.0, 2.0, 3.0]),
+        output_rms=np.ones((3, 2)),
+        noise_rms=np.sqrt([[100.0, 200.0], [300.0, 400.0], [7.0, 4.5]]),
+        responses=[
+            response([[16.0, 1.0], [9.0, 4.0], [16.0, 5.0]], None),
+            None,
+            response([[4.0, 9.0], [2.0, 0.0], [1.0, 0.0]], [0.5, 1.0]),
+        ],
+    )
+
+
+def test_floors_by_hand_are_raised_to_the_noise_of_their_own_amplitude_and_output():
+    """Of the third amplitude a quarter of the first output's power is noise of the mean, 1.75 in all, four times less
+    than the noise of the held-out records; the second output's is all noise, and more than that of the records.
+    """
+    found = by_hand_of_floors()
+    floor, noise = words.band_floors(found)
+    nothing = [np.nan, np.nan]
+    np.testing.assert_allclose(
+        floor**2,
+        [[[16.0, 1.0], [25.0, 9.0]], [nothing, nothing], [[4.0 + 3.0, 9.0], [3.0 + 3.0 * 0.75, np.nan]]],
+    )
+    np.testing.assert_allclose(noise**2, [[nothing, nothing], [nothing, nothing], [[4.0, 9.0], [4.0 * 0.75, np.nan]]])
+    np.testing.assert_allclose(words.linear_floor(found) ** 2, [[41.0, 10.0], nothing, [12.25, 9.0]])
+
+
+@pytest.mark.parametrize("short", [False, True])
+def test_output_error_floor_and_noise_of_each_amplitude_stand_in_a_row_of_their_own(monkeypatch, short):
+    count = 6
+    size = np.arange(1.0, count + 1)[:, None]
+    outputs = [SimpleNamespace(name="tip", quantity="angle"), SimpleNamespace(name="tilt", quantity="angle")]
+    own = SimpleNamespace(
+        error_rms=1e-6 * size * np.array([[3.0, 4.0]]), model=SimpleNamespace(outputs=outputs), note=""
+    )
+    own.error_rms[4] = np.nan
+    found = SimpleNamespace(
+        candidate=lambda: own,
+        amplitudes_v=0.1 * size[:, 0],
+        output_rms=1e-6 * (10.0 + size) * np.array([[7.0, 1.0]]),
+        noise_rms=1e-8 * size**2 * np.array([[7.0, 1.0]]),
+    )
+    monkeypatch.setattr(words, "linear_floor", lambda found: 1e-6 * size**0.5 * np.array([[7.0, 1.0]]))
+    table = coupled_page._amplitudes(found, short=short)
+    assert [*table.headings] == [
+        *("drive, rms", "output (µrad)", "error (µrad)", "of output", "best linear (µrad)", "noise (µrad)"),
+        "worst output",
+    ]
+    rows = []
+    for k in (0, 1, 2, 5) if short else range(count):
+        n = k + 1
+        drive, output = f"{100 * n} mV", f"{5.0 * (10 + n):.3g}"
+        shares = np.array([3.0, 4.0]) * n / ((10 + n) * np.array([7.0, 1.0]))
+        error = "" if k == 4 else f"{12.5**0.5 * n:.3g}"
+        share = "" if k == 4 else f"{100 * np.sqrt(np.mean(shares**2)):.3g} %"
+        worst = "" if k == 4 else f"tilt, {100 * shares[1]:.3g} %"
+        rows.append((drive, output, error, share, f"{5 * n**0.5:.3g}", f"{0.05 * n**2:.3g}", worst))
+    assert [tuple(map(str, row)) for row in table.rows] == rows
