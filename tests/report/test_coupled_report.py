@@ -1221,3 +1221,45 @@ def test_output_error_floor_and_noise_of_each_amplitude_stand_in_a_row_of_their_
         worst = "" if k == 4 else f"tilt, {100 * shares[1]:.3g} %"
         rows.append((drive, output, error, share, f"{5 * n**0.5:.3g}", f"{0.05 * n**2:.3g}", worst))
     assert [tuple(map(str, row)) for row in table.rows] == rows
+
+
+def test_the_responses_of_three_outputs_and_two_drives_stand_output_by_output():
+    of = np.array([[2.0, 3.0], [5.0, 7.0], [11.0, 13.0]]) * 1e-6
+    freq = np.array([1.0, 10.0, 100.0])
+    measured = SimpleNamespace(
+        freq_hz=freq,
+        response=np.array([4.0, 2.0j, -1.0])[:, None, None] * of,
+        standard_error=0.01 * np.ones((3, 1, 1)) * of,
+        method="a method",
+    )
+    outputs = [SimpleNamespace(name=name, quantity="displacement") for name in ("tip", "tilt", "piston")]
+    model = SimpleNamespace(outputs=outputs, actuators=[SimpleNamespace(name="left"), SimpleNamespace(name="right")])
+    found = SimpleNamespace(
+        candidate=lambda: SimpleNamespace(model=model),
+        chosen="coupled linear, order 3",
+        amplitudes_v=np.array([0.1, 0.25]),
+        responses=[None, measured],
+        modelled=[None, measured.response * np.array([1.0, 1.5, 0.5])[:, None, None]],
+    )
+    figure = coupled_figures_module.response(found, 1)
+    assert figure.title == "Frequency response at 250 mV rms drive"
+    assert "at 250 mV rms drive (a method). The model is coupled linear, order 3, the chosen one, " in figure.caption
+    assert (figure.sheet.heights, figure.sheet.widths) == ((1.0,) * 3, (1.0,) * 2)
+    panels = figure.sheet.panels
+    assert [(panel.row, panel.column, panel.title, panel.x.title, panel.y.title) for panel in panels] == [
+        (0, 0, "left → tip", "", "gain (µm/V)"),
+        (0, 1, "right → tip", "", ""),
+        (1, 0, "left → tilt", "", "gain (µm/V)"),
+        (1, 1, "right → tilt", "", ""),
+        (2, 0, "left → piston", "frequency (Hz)", "gain (µm/V)"),
+        (2, 1, "right → piston", "frequency (Hz)", ""),
+    ]
+    for panel, scale in zip(panels, 1e6 * of.ravel(), strict=True):
+        seen, left, modelled = panel.all_of(Line)
+        np.testing.assert_allclose(seen.y, scale * np.array([4.0, 2.0, 1.0]))
+        np.testing.assert_allclose(modelled.y, scale * np.array([4.0, 3.0, 0.5]))
+        assert np.isnan(left.y[0]) and left.y[1:] == pytest.approx([scale, 0.5 * scale])
+        (ring,) = panel.all_of(Area)[0].rings
+        half = 0.01 * scale * 1.96 / np.sqrt(2.0)
+        np.testing.assert_allclose(ring[:3, 1], scale * np.array([4.0, 2.0, 1.0]) - half)
+        assert panel.y.low == pytest.approx(1.0 / 1.5)  # under the least that the model leaves anywhere: 2 · 0.5
