@@ -2421,3 +2421,34 @@ def test_the_spectra_of_a_loop_are_those_of_its_first_axis_controller_by_control
         "best, simulated (rad^2/Hz)": [0.25, 0.75, 0.035],
         "best, predicted (rad^2/Hz)": [0.5, 0.125, 0.375],
     }
+
+
+def test_a_recording_stands_in_place_of_the_angle_of_arrival_where_the_loop_has_one_about_its_first_axis():
+    def disturbance(name):
+        return ns(name=name, rms_rad=1.25e-6, basis="weak turbulence; fit of a filter", source="a paper")
+
+    own, other = disturbance("angle of arrival"), disturbance("OLYMPUS")
+    timing = ns(step_s=1e-3, period_s=1.0 / 2000.0)
+    about = []
+    for disturbances in ([[other, own], [other]], [[other], [own]]):
+        loop = ns(timing=timing, disturbances=disturbances)
+        text = recorded.recording_text("a.csv", two_played_axes(), loop, "PI", 300)
+        about.append((text.split("in place of the mission's ")[1].split(".")[0], words.arrival(loop)))
+    assert about == [
+        (
+            "vibration, wheels, angle of arrival and body",
+            [
+                "Angle of arrival, 1.25 µrad rms per axis before the loop: the tracked light comes down through the "
+                "air of channel.turbulence, weak turbulence. Source: a paper."
+            ],
+        ),
+        ("vibration, wheels and body", []),
+    ]
+
+
+@pytest.mark.parametrize(("rate_hz", "warned"), [(799.0, False), (800.0, False), (801.0, True)])
+def test_a_recording_is_too_slow_for_a_loop_that_reads_faster_alone(rate_hz, warned):
+    """The recording has 800 Hz."""
+    loop = ns(timing=ns(step_s=1e-3, period_s=1.0 / rate_hz), disturbances=[[]])
+    said = [each for each in recorded.sentences(two_played_axes(), loop) if each.startswith("Warning: ")]
+    assert [each.split(": ")[1].partition(",")[0] for each in said] == ["the recording ends at 400 Hz"] * warned

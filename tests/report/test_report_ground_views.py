@@ -311,3 +311,19 @@ Closed forms over flat air; a scintillation index is that of any strength, sprea
 35 deg / 800 km / 1.25 dB / +4.50 dB
 Flat and still air without clouds. Lost in it is what absorption and scattering take.
 """)
+
+
+def test_a_margin_without_fades_is_drawn_where_they_cost_something_at_a_single_elevation(study):
+    given = at_elevations(1.0, 2.0, 4.0)
+    faded = tuple(replace(e, fade_db=db) for e, db in zip(given.elevations, (0.0, 0.75, 0.0), strict=True))
+    figure = ground.over_elevation(with_ground(study, given), replace(given, elevations=faded))
+    margin, without, required = figure.sheet.panels[0].marks
+    assert (margin.label, without.label) == ("margin", "without fades of the air")
+    np.testing.assert_allclose([margin.x, without.x], [[20.0, 30.0, 40.0]] * 2)
+    np.testing.assert_allclose([margin.y, without.y], [[1.0, 2.0, 4.0], [1.0, 2.75, 4.0]])
+    assert (required.at, required.upright) == (3.0, False)
+    assert [[*np.round(of, 9)] for of in figure.columns.values()] == [
+        [20.0, 30.0, 40.0],
+        [1.0, 2.0, 4.0],
+        [0.0, 0.75, 0.0],
+    ]
