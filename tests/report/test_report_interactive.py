@@ -2208,3 +2208,17 @@ def test_a_figure_has_its_title_as_text_alternative_and_a_hatching_of_its_own():
         "kept",
         '<svg role="img" aria-label="A &quot;quoted&quot; &lt;title&gt; &amp; more" kept/>',
     )
+
+
+def test_a_figure_has_the_forms_that_it_is_given_and_draws_its_own_where_it_is_changed():
+    sheet, (panel,) = grid(3.0, 2.0)
+    panel.add(Line(np.array([1.0, 2.0]), np.array([3.0, 5.0]), label="a curve"))
+    figure = Figure("name", "A <title>", "caption", sheet, {"x (m)": np.array([1.25, 2.5]), "word": ("one", "two")})
+    drawn = figure.svg, figure.plot
+    figure.take("<svg width='1'>earlier</svg>", '{"earlier": 1}')
+    assert (figure.svg, figure.plot) == ("<svg width='1'>earlier</svg>", '{"earlier": 1}')
+    assert figure.labelled == '<svg role="img" aria-label="A &lt;title&gt;" width=\'1\'>earlier</svg>'
+    still = figure.static
+    assert (still.svg, still.plot, still.alive, figure.alive) == (drawn[0], "", False, True)
+    assert "earlier" not in drawn[0] and json.loads(drawn[1])["data"][0]["name"] == "a curve"
+    assert figure.rows(3) == [("1.25", "one"), ("2.5", "two")]
