@@ -26,6 +26,7 @@ from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.ensemble import COUNTERS, bin_edges_rad
 from microrad.loop.pointing_loop.linear import close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
+from microrad.loop.worst_case import Extent, InTime, Quantiles, Sensitivity, Worst, WorstCase
 from microrad.report import quantities
 from microrad.report.fine_pointing import data as plain_data
 from microrad.report.fine_pointing import figures, simulated_windows, tails, windows, words, worst_case
@@ -2452,3 +2453,65 @@ def test_a_recording_is_too_slow_for_a_loop_that_reads_faster_alone(rate_hz, war
     loop = ns(timing=ns(step_s=1e-3, period_s=1.0 / rate_hz), disturbances=[[]])
     said = [each for each in recorded.sentences(two_played_axes(), loop) if each.startswith("Warning: ")]
     assert [each.split(": ")[1].partition(",")[0] for each in said] == ["the recording ends at 400 Hz"] * warned
+
+
+def test_the_data_of_a_worst_case_of_two_indices_as_a_whole():
+    found = WorstCase(
+        controller="LQG",
+        extent=Extent(draws=40, most_sensitive=2, sigmas=2.5),
+        indices=two_indices(),
+        corners=8,
+        corners_left_out=1,
+        unstable_draws=3,
+        unstable_corners=2,
+        nominal_rad=(1e-6, 2.5e-6),
+        drawn_rad=(Quantiles(1.25e-6, 1.5e-6), Quantiles(2.75e-6, 3.125e-6)),
+        largest_rad=(Worst(5e-6, {"alpha": 2.5}), Worst(4.5e-6, {"alpha": -1.25})),
+        nominal_modulus=0.5625,
+        drawn_modulus=Quantiles(0.53125, 0.4375),
+        smallest_modulus=Worst(0.3125, {"alpha": 0.75}),
+        most_sensitive=(Sensitivity("alpha", (0.01, -0.025), 0.002), Sensitivity("mode 1", (0.25, 0.5), -0.125)),
+        verified_in_time=InTime(0.987654, "settles", "grows", 0.125, 3e-6),
+    )
+    assert worst_case.worst_case_data(found) == {
+        "controller": "LQG",
+        "extent": {"draws": 40, "most_sensitive": 2, "sigmas": 2.5},
+        "corners": 8,
+        "corners_left_out": 1,
+        "unstable_draws": 3,
+        "unstable_corners": 2,
+        "nominal_modulus": 0.5625,
+        "drawn_modulus": {"median": 0.53125, "worse": 0.4375},
+        "smallest_modulus": {"value": 0.3125, "sigmas": {"alpha": 0.75}},
+        "most_sensitive": (
+            {"parameter": "alpha", "rms": (0.01, -0.025), "modulus": 0.002},
+            {"parameter": "mode 1", "rms": (0.25, 0.5), "modulus": -0.125},
+        ),
+        "errors": [
+            {
+                "index": "RPE",
+                "window_s": 0.25,
+                "spacing_s": None,
+                "nominal_rad": 1e-6,
+                "drawn_rad": {"median": 1.25e-6, "worse": 1.5e-6},
+                "largest_rad": {"value": 5e-6, "sigmas": {"alpha": 2.5}},
+            },
+            {
+                "index": "PDE",
+                "window_s": 0.5,
+                "spacing_s": 8.0,
+                "nominal_rad": 2.5e-6,
+                "drawn_rad": {"median": 2.75e-6, "worse": 3.125e-6},
+                "largest_rad": {"value": 4.5e-6, "sigmas": {"alpha": -1.25}},
+            },
+        ],
+        "verified_in_time": {
+            "pole": 0.987654,
+            "linear": "settles",
+            "with_hysteresis": "grows",
+            "seconds": 0.125,
+            "offset_rad": 3e-6,
+            "theory": "settles",
+            "agrees": False,
+        },
+    }
