@@ -1263,3 +1263,19 @@ def test_the_responses_of_three_outputs_and_two_drives_stand_output_by_output():
         half = 0.01 * scale * 1.96 / np.sqrt(2.0)
         np.testing.assert_allclose(ring[:3, 1], scale * np.array([4.0, 2.0, 1.0]) - half)
         assert panel.y.low == pytest.approx(1.0 / 1.5)  # under the least that the model leaves anywhere: 2 · 0.5
+
+
+def test_a_short_table_has_the_best_model_of_each_kind_and_the_chosen_one():
+    more = (
+        unlike_candidate("coupled linear, order 5", "coupled linear", 31, 0.1937),
+        unlike_candidate("per axis, order 4", "per axis", 19, 0.6125),
+    )
+    found = unlike_found()
+    table = coupled_page._candidates(replace(found, candidates=(*more, *found.candidates)), short=True)
+    assert [tuple(map(str, row)) for row in table.rows] == [
+        ("hysteretic stiffness, order 5", "81", "5.17 %", "within noise"),
+        ("hysteretic stiffness, order 3", "47", "5.23 %", "chosen"),
+        ("coupled linear, order 5", "31", "19.4 %", ""),
+        ("per axis, order 2", "11", "52.3 %", ""),
+    ]
+    assert [*table.best] == [1]

@@ -1633,3 +1633,29 @@ def test_a_page_of_links_has_what_was_solved_for_ahead_of_the_budgets_and_a_stan
 )
 def test_a_rate_is_whole_from_ten_megabits_on_whichever_its_sign(rate_bit_s, said):
     assert links._mbit_s(rate_bit_s) == said
+
+
+def test_the_data_have_the_tornado_of_each_beam_behind_that_of_communication(plain):
+    own, *others = plain.tornados
+    data = links_data(plain)
+    assert [(each["of"], each["margin_db"]) for each in data["other_tornados"]] == [
+        (budget.name, pytest.approx(budget.margin_db)) for budget in plain.budgets[1:]
+    ]
+    assert [each.of for each in others] == ["Beacon", "Answer"]
+    for made, of in zip(
+        (data["tornado"], *(each["tornado"] for each in data["other_tornados"])), plain.tornados, strict=True
+    ):
+        assert made == [
+            {
+                "input": s.key,
+                "unit": s.unit,
+                "value": s.value,
+                "low": s.low,
+                "high": s.high,
+                "margin_low_db": s.margin_low_db,
+                "margin_high_db": s.margin_high_db,
+                "source": s.source,
+            }
+            for s in of.swings
+        ]
+    assert own.of == "Communication"
