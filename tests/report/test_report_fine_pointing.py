@@ -2515,3 +2515,22 @@ def test_the_data_of_a_worst_case_of_two_indices_as_a_whole():
             "agrees": False,
         },
     }
+
+
+def test_the_setting_of_a_loop_of_several_axes_has_its_counts_times_and_the_disturbances_of_the_first():
+    loop = ns(
+        timing=ns(period_s=1e-3, delay_steps=3, step_s=5e-5),
+        optical=ns(noise_rad=2.5e-7),
+        disturbances=[
+            [ns(name="body", rms_rad=2e-6), ns(name="wheels", rms_rad=1.25e-6)],
+            [ns(name="x", rms_rad=9e-6)],
+        ],
+        mirror=ns(name="tripod", actuators=3, axes=2, A=np.zeros((5, 5)), bank=[None] * 4),
+    )
+    table = ns(runs=7, duration_s=20.0, settle_s=0.5, seed=11, modulus_margin=0.55)
+    assert section.setting(ns(scene=ns(loop=loop, table=table))) == (
+        "Mirror of several axes: tripod, 3 actuators, 2 outputs, 5 states, 4 hysteresis elements. Control at 1 kHz "
+        "with 150 µs of delay, sensor noise 250 nrad rms per axis and reading; disturbances, rms per axis before the "
+        "loop: body 2.00 µrad and wheels 1.25 µrad. Simulated: 7 runs of 20 s each, the first 500 ms left out, seed 11. A "
+        "design has to keep a modulus margin of 0.55."
+    )
