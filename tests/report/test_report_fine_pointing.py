@@ -2531,6 +2531,6 @@ def test_the_setting_of_a_loop_of_several_axes_has_its_counts_times_and_the_dist
     assert section.setting(ns(scene=ns(loop=loop, table=table))) == (
         "Mirror of several axes: tripod, 3 actuators, 2 outputs, 5 states, 4 hysteresis elements. Control at 1 kHz "
         "with 150 µs of delay, sensor noise 250 nrad rms per axis and reading; disturbances, rms per axis before the "
-        "loop: body 2.00 µrad and wheels 1.25 µrad. Simulated: 7 runs of 20 s each, the first 500 ms left out, seed 11. "
-        "A design has to keep a modulus margin of 0.55."
+        "loop: body 2.00 µrad and wheels 1.25 µrad. Simulated: 7 runs of 20 s each, the first 500 ms left out, seed "
+        "11. A design has to keep a modulus margin of 0.55."
     )
