@@ -2030,6 +2030,9 @@ def test_a_verdict_is_good_where_all_is_met_and_the_judged_mirror_is_known(monke
     assert list(box.blocks) == [
         "table of 2",
         "Derived, so that meeting it proves nothing: a.b = 3 dB: from the margin.",
+    ]
+
+
 def test_inputs_that_are_assumed_inferred_or_changed_are_found_by_their_rows(monkeypatch):
     """Changed is one by its value, one by a comment of another value, and one that nothing shipped has."""
     monkeypatch.setattr("microrad.mission.file.changed_from_shipped", lambda sources: (("z.e", "5", "4"),))

@@ -1416,6 +1416,8 @@ def test_a_recording_that_another_tab_removes_as_it_is_looked_at_has_no_size(tmp
     (tmp_path / "there.csv").write_bytes(b"123")
     os.utime(tmp_path / "there.csv", ns=(1, 2_000_000_500))
     assert recording_uploads._status(tmp_path / "there.csv") == (3, 2_000_000_500)
+
+
 def test_a_path_outside_of_its_folder_or_none_at_all_is_told_with_the_folder(tmp_path):
     root = tmp_path.resolve() / "own"
     root.mkdir()
