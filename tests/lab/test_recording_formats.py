@@ -2167,6 +2167,7 @@ def test_a_variable_that_is_no_channel_says_why(dtype, shape, words):
     [
         ("g/v[1, 2]", (slice(None), 1, 2)),
         ("v[0,3]", (slice(None), 0, 3)),
+        ("v[ 1 ,0]", (slice(None), 1, 0)),
         *(
             (wanted, None)
             for wanted in (
@@ -2192,7 +2193,7 @@ def test_an_index_picks_a_channel_out_of_an_array_where_each_part_is_within_its_
     if index is None:
         assert made is None
     else:
-        assert (made.name, made.samples, made.unit) == (wanted, 9, "mV")
+        assert (made.name, made.samples, made.unit) == (f"g/v[{index[1]}, {index[2]}]", 9, "mV")
         assert made.load().tolist() == values[index].tolist()
 
 
@@ -2286,7 +2287,7 @@ def test_a_channel_of_an_array_of_three_axes_has_one_name_however_it_is_spaced(t
         file["run/cube"].attrs["unit"] = "mV"
         file.attrs["Fs"] = RATE_HZ
     (named,) = read_recording(path, wanted.replace("]", ", 0]"), "cube[1,1,0]").input_names
-    assert named == ("run/" if "run" in wanted else "") + "cube[1, 0, 0]"
+    assert named == "run/cube[1, 0, 0]"
     read = read_recording(path, wanted.replace("]", ",0]"), "cube[1, 1, 0]")
     np.testing.assert_array_equal(read.drive[:, 0], DRIVE)
     np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
@@ -2429,3 +2430,17 @@ def test_the_end_of_a_name_may_have_letters_of_either_case(tmp_path, name):
                 file[key] = values
     (tmp_path / name).write_bytes(content.getvalue())
     check(read_recording(tmp_path / name, "drive", "output"))
+
+
+@pytest.mark.parametrize(
+    ("group", "rates"), [("run/cube", (500.0, 500.0)), ("run", (500.0, 500.0)), ("", (500.0, 500.0))]
+)
+def test_a_channel_by_the_short_name_of_its_array_has_the_rate_of_the_array(tmp_path, group, rates):
+    path = tmp_path / "r.h5"
+    with h5py.File(path, "w") as file:
+        file["run/cube"] = np.stack([np.stack([OUTPUT, DRIVE]), np.stack([DRIVE, OUTPUT])])
+        (file[group] if group else file).attrs["Fs"] = 500.0
+    found = [read_recording(path, f"{name}[0, 0]", f"{name}[1, 0]", alone=False) for name in ("cube", "run/cube")]
+    assert tuple(each.rate_hz for each in found) == rates
+    source = open_source(path)
+    assert len({source.resolve(name, "drive") for name in ("cube[0,1]", "run/cube[0, 1]", "cube[ 0 , 1]")}) == 1

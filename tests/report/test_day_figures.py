@@ -1147,3 +1147,15 @@ def test_the_map_of_a_day_takes_its_stations_from_both_tables_and_says_where_it_
     view.duration_s, track.relay, day.operations = figures.LONGEST_S, None, None
     assert figures.ground_map(day)[2::2] == ({}, None)
     assert seen[-1] == (view, "ways", None, None)
+
+
+def test_of_many_bends_the_last_is_drawn_although_it_is_not_one_of_every_so_many():
+    """900 bends, drawn at every second one; the last has a tenth of the data."""
+    bends = np.linspace(10.0, 100.0, 900)
+    data = np.append(np.ones(899), 99.0)
+    given = SimpleNamespace(
+        first_s=bends, last_s=bends, cdf=lambda at: np.array([data[bends <= x].sum() for x in at]) / data.sum()
+    )
+    latency_s, share = figures._distribution(SimpleNamespace(latency=given))
+    assert (latency_s[-1], share[-1]) == (100.0, 1.0)
+    assert share[-2] == pytest.approx(899.0 / 998.0, rel=1e-12)

@@ -3247,6 +3247,7 @@ def test_a_number_on_two_inputs_beyond_tells_the_farther_first_and_the_legend_wh
         (("12", "3"), "-12, −12 or +12 and 12", "-12, −12 or +12 and 12 †"),
         (("12", "12"), "12 and 12 % of 120", "12 † and 12 † % of 120"),
         (("3", "12"), "3 with 12, 0.3 and v3", "3 † with 12 †, 0.3 and v3"),
+        (("3", "4"), "3 in all, 3.12 dB each, 3,120 rows, 4", "3 † in all, 3.12 dB each, 3,120 rows, 4 †"),
     ],
 )
 def test_a_sum_in_a_fold_has_its_sign_once_and_other_numbers_that_end_like_it_have_none(far, sums, folded, said):

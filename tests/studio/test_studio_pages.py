@@ -3024,3 +3024,58 @@ def test_blocks_that_take_the_place_of_others_look_as_if_they_were_the_first(tab
     second.show_blocks(blocks, figures)
     assert outline(first) == outline(second) != []
     assert texts(first)[0] == "before" and texts(first)[-1] == "behind"
+
+
+def test_another_mission_ends_the_tuning_of_all_controllers(session, controls, monkeypatch):
+    gates = []
+    asyncio.run(controls.reload())
+
+    async def slow(element, work, *args):
+        gates.append(asyncio.Event())
+        if len(gates) == 1:
+            await gates[0].wait()
+        return work(*args)
+
+    async def changed():
+        tuning = asyncio.create_task(controls.tune_all())
+        await asyncio.sleep(0)
+        before = controls.tune.visible, controls.stop.visible
+        session.set(LEO, "6 cm")
+        await controls.reload()
+        gates[0].set()
+        await tuning
+        return before, (controls.tune.visible, controls.stop.visible)
+
+    monkeypatch.setattr(control, "in_thread", slow)
+    assert asyncio.run(changed()) == ((False, True), (True, False))
+
+
+def test_a_late_refusal_of_an_older_question_is_dropped_as_a_late_answer_is(session, controls, monkeypatch):
+    gate = asyncio.Event()
+
+    def ask(ask, variants):
+        raise ValueError("the loop is not stable")
+
+    async def slow(element, work, *args):
+        if work is ask:
+            await gate.wait()
+        return work(*args)
+
+    async def both():
+        older = asyncio.create_task(controls.show())
+        while controls.state.text != "Simulating ...":
+            await asyncio.sleep(0)
+        controls.filling = True
+        controls.name.value = "PID"
+        controls.filling = False
+        await controls.show()
+        gate.set()
+        await older
+
+    asyncio.run(controls.reload())
+    monkeypatch.setattr(control, "in_thread", slow)
+    monkeypatch.setattr(
+        control, "_controller", lambda file, name: controller(name, **({"ask": ask} if name == "PI" else {}))
+    )
+    asyncio.run(both())
+    assert (controls.fault.text, controls.state.text, behind(controls)) == ("", "", set())

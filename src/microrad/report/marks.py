@@ -105,7 +105,8 @@ class Marks:
             if row >= sums:
                 for before, after in zip(map(str, cells), map(str, signed), strict=True):
                     if before != after:
-                        folded = re.sub(rf"(?<![\w.+−-]){re.escape(before)}(?!\w| [{BEYOND}{BARE}])", after, folded)
+                        whole = rf"(?<![\w.+−-]){re.escape(before)}(?!\w|[.,]\d| [{BEYOND}{BARE}])"
+                        folded = re.sub(whole, after, folded)
             rows.append(tuple(signed) if isinstance(cells, tuple) else signed)
         return replace(table, rows=rows, folded=folded)
 

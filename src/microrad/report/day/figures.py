@@ -455,7 +455,7 @@ def _distribution(way: Way) -> tuple[Floats, Floats]:
     bends = np.unique(np.concatenate((way.latency.first_s, way.latency.last_s)))
     if not bends.size:
         return bends, bends
-    bends = bends[:: max(bends.size // _SHARES, 1)]
+    bends = np.append(bends[:: max(bends.size // _SHARES, 1)], bends[-1])
     even = np.linspace(bends[0], bends[-1], _SHARES)
     latency_s = np.unique(np.concatenate((bends, bends * (1.0 - _BEFORE), even)))
     return latency_s, way.latency.cdf(latency_s)

@@ -114,7 +114,8 @@ class ControlPage:
         if file is None or (self.file is not None and key == self.key and file == self.file):
             return
         names = await in_thread(self.table, _names, file.mission.fine_pointing)
-        self.file, self.key, self.round = file, key, self.round + 1
+        self.file, self.key = file, key
+        self.stop_all()
         self.found = dict.fromkeys(names, "not looked at yet")
         self._table()
         self.filling = True
@@ -190,6 +191,8 @@ class ControlPage:
             self.state.text = "Simulating ..."
             answers = await in_thread(self.table, found.ask, ask, control_view.SHOWN[self.variants.value])
         except ValueError as error:
+            if mine != self.question:
+                return
             self.fault.text, self.state.text = str(error), ""
             self._dim([name for name in self.plots if name not in _OWN])
             return

@@ -158,7 +158,7 @@ def indexed(source: Container, variables: list[Variable], wanted: int | str) -> 
         fits = len(index) == len(others) and all(i < n for n, i in zip(others, index, strict=True))
         if fits and len(others) >= 2 and variable.dtype.kind in "iuf":
             channel = _channel(variable, tuple(i for _, i in wide))
-            return Channel(str(wanted), channel.samples, channel.load, variable.unit)
+            return replace(channel, name=f"{variable.name}[{', '.join(map(str, index))}]")
     return None
 
 
@@ -198,8 +198,10 @@ class ArraySource(Container):
             wanted = re.sub(r"\s*,\s*", ", ", wanted)
             extra = None if wanted in self.names else indexed(self, self.variables, wanted)
             if extra is not None:
-                self.channels = (*self.channels, extra)
-                self.names, self.units = (*self.names, extra.name), (*self.units, extra.unit)
+                wanted = extra.name
+                if wanted not in self.names:
+                    self.channels = (*self.channels, extra)
+                    self.names, self.units = (*self.names, extra.name), (*self.units, extra.unit)
         return super().resolve(wanted, role)
 
     def whole(self, wanted: str | None, axes: int, role: str) -> Variable:
