@@ -20,7 +20,7 @@ from microrad.link.acquisition import partner_search as link_acquisition
 from microrad.link.budget.lines import LEFT_AT_ZERO
 from microrad.link.radial_error import Jitter
 from microrad.loop import sensor
-from microrad.mission.file import LinkFile
+from microrad.mission.file import LinkFile, load_link
 from microrad.report import requirements
 from microrad.report.links import budgets as budget_views
 from microrad.report.links import words as links_words
@@ -30,7 +30,7 @@ from microrad.report.links.views import acquisition_paragraphs, acquisition_view
 from microrad.report.quantities import quantity
 from microrad.report.tables import Table
 from preset_files import NAMES, completed
-from shipped import edited_file
+from shipped import SHIPPED, edited_file
 
 URAD, LIGHT_M_S, CHARGE_C = 1e-6, 299_792_458.0, 1.602176634e-19
 NORMAL_99 = float(norm.ppf(0.995))
@@ -1229,3 +1229,12 @@ def test_lines_of_links_unlike_each_other_say_where_each_number_comes_from(unlik
         f"{x.name} ({x.unit}): {x.basis} | {x.source} | {x.regime} | {x.warning}" for x in lines_of_all(unlike(case))
     }
     assert not set(expected) - written
+
+
+def test_a_rate_that_is_solved_for_is_in_place_of_no_other_although_the_comment_of_another_stands_behind_it(tmp_path):
+    text = SHIPPED.read_text("utf-8")
+    stated = re.search(r'data_rate = "300 Mbit/s".*', text).group()
+    path = tmp_path / "m.toml"
+    path.write_text(text.replace(stated, stated.replace('"300 Mbit/s"', '"largest"')), "utf-8")
+    file = link_study.solve_rate(load_link(path))
+    assert file.sources["communication.data_rate"].text == "solved for: the largest with 3 dB at 10 µrad"

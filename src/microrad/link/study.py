@@ -119,7 +119,7 @@ def solve_rate(file: _File) -> _File:
     rate = link.largest_data_rate(data, q.margin_db, error)
     beam = m.communication.model_copy(update={"data_rate_bit_s": rate})
     at = f"{q.margin_db:g} dB at {format_quantity(error, 'rad')}"
-    solved = replace(own, value=format_quantity(rate, "bit/s"), comment=f"solved for: the largest with {at}")
+    solved = replace(own, value=format_quantity(rate, "bit/s"), comment=f"solved for: the largest with {at}", was="")
     mission = m.model_copy(update={"communication": beam})
     return replace(file, mission=mission, sources={**file.sources, "communication.data_rate": solved})
 
