@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,9 +12,11 @@ import pytest
 import budgets
 from link_files import GAUSSIAN, PATTERN, data_with, link_file, received_with, written
 from microrad import link
+from microrad.core.units import format_quantity
 from microrad.link import study as link_study
 from microrad.link import variation
 from microrad.link.pointing import outage as link_performance
+from microrad.mission.model import Source
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
 JITTER = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
@@ -315,3 +318,36 @@ def test_values_below_0_are_looked_for_by_their_size_and_told_in_order(tmp_path,
 def test_an_item_that_is_0_is_refused_by_its_place(tmp_path):
     with pytest.raises(ValueError, match=r"^jitter\.bias\.1 is 0, which no factor moves"):
         link_study.solve_key(biased(tmp_path, "0 urad", "-1 urad"), "jitter.bias.1")
+
+
+@pytest.mark.parametrize(("key", "unit", "was"), [
+    ("communication.transmit_power", "W", '"4 W"'),
+    ("communication.transmit_optics_loss", "dB", ""),
+    ("communication.strehl", "dB", "0.5"),
+])  # fmt: skip
+def test_a_value_solved_for_says_so_and_stands_in_place_of_no_other(tmp_path, key, unit, was):
+    file = link_file(tmp_path, NO_BEAMS, {"communication.data_rate": "100 Mbit/s"})
+    own = replace(file.sources[key], comment="paper: Table 2", was=was) if was else None
+    others = {name: each for name, each in file.sources.items() if name != key}
+    solution = link_study.solve_key(replace(file, sources=others | ({key: own} if was else {})), key)
+    given = solution.file.sources[key]
+    shown = format_quantity(solution.value, unit)
+    assert given == Source(own.line if was else 0, "solved for: 3 dB of communication", shown)
+    assert given.text == "solved for: 3 dB of communication"
+    assert {name: each for name, each in solution.file.sources.items() if name != key} == others
+
+
+@pytest.mark.parametrize(("key", "values", "largest"), [
+    ("rms", ("2 urad", "3 urad"), 3e-6),
+    ("rms", ("3 urad", "2 urad"), 3e-6),
+    ("bias", ("1 urad", "-2 urad"), -2e-6),
+])  # fmt: skip
+def test_where_no_value_leaves_the_margin_the_file_keeps_its_own_with_the_larger_axis(
+    tmp_path, monkeypatch, key, values, largest
+):
+    monkeypatch.setattr(variation, "STEPS", 1)  # few are enough where none leaves it
+    jitter = {"jitter": UNLIKE["jitter"] | {key: list(values)}}
+    file = link_file(tmp_path, NO_BEAMS, jitter, {"communication.data_rate": "100 Gbit/s"})
+    solution = link_study.solve_key(file, f"jitter.{key}")
+    assert (solution.solved.intervals, solution.value, solution.unit) == ((), largest, "rad")
+    assert solution.file == file

@@ -18,6 +18,7 @@ from microrad.link import study as link_study
 from microrad.link.acquisition import detection, scan, sequence
 from microrad.link.acquisition import partner_search as link_acquisition
 from microrad.link.budget.lines import LEFT_AT_ZERO
+from microrad.link.pointing.outage import margin_db
 from microrad.link.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile, load_link
@@ -1238,3 +1239,34 @@ def test_a_rate_that_is_solved_for_is_in_place_of_no_other_although_the_comment_
     path.write_text(text.replace(stated, stated.replace('"300 Mbit/s"', '"largest"')), "utf-8")
     file = link_study.solve_rate(load_link(path))
     assert file.sources["communication.data_rate"].text == "solved for: the largest with 3 dB at 10 µrad"
+@pytest.mark.parametrize("shaken", [{}, SHAKEN, {"jitter": SHAKEN["jitter"] | {"rms": ["3 urad", "9 urad"]}}])
+def test_the_best_radius_of_a_beam_is_that_at_the_margin_which_its_budget_has(tmp_path, shaken):
+    """Where the beam is shaken, a narrower one in the aperture leaves more, as it is wider afar."""
+
+    def lit(radius_m):
+        beam = {"profile": "gaussian", "radius": f"{radius_m * 1e3:.9f} mm", "m_squared": 1.0}
+        return link.of(link_file(tmp_path, PATTERN, {"communication.beam": beam}, shaken).mission)
+
+    best = link_study.beam_radius(lit(12e-3))
+    own, there, wider, narrower = (
+        margin_db(lit(radius_m)) for radius_m in (12e-3, best.best_m, 1.1 * best.best_m, best.best_m / 1.1)
+    )
+    assert there - own == pytest.approx(best.gained_db, abs=1e-6)
+    assert there >= max(wider, narrower)
+
+
+@pytest.mark.parametrize(("frame", "look"), [("1 ms", "20 ms"), ("20 ms", "1 ms")])
+def test_no_look_of_the_trade_is_shorter_than_the_shortest_that_the_mission_states(tmp_path, monkeypatch, frame, look):
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([30e-6, 90e-6]))
+    bright = {"beacon.transmit_power": "20 kW", "acquisition.detection": frame, "acquisition.scan.detection": look}
+    found = link_study.run_link_study(link_file(tmp_path, FEW, bright)).finding
+    assert found.scanned.stated_detection_s == parse_quantity(look, "s")
+    assert found.trade.wide_time_s[0] == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_light_takes_as_long_as_the_beacon_has_to_go_where_the_links_have_unlike_distances(tmp_path):
+    away = {"beacon.distance": "30000 km", "answer.distance": "20000 km", "communication.distance": "10000 km"}
+    found = studied(tmp_path, away).finding
+    light_s = 3e7 / LIGHT_M_S
+    travels = {stage.name: stage.duration_s for stage in found.wide.stages if stage.name.endswith("travels")}
+    assert len(travels) == 4 and travels == pytest.approx(dict.fromkeys(travels, light_s), rel=1e-12)
