@@ -1383,3 +1383,59 @@ def test_a_line_that_the_loop_leaves_is_a_sine_on_each_axis_that_it_shakes(monke
     assert amplitudes["wheel"] == [pytest.approx([4e-6, 0.0])]
     assert amplitudes["both"] == [pytest.approx([2e-6, 0.0]), pytest.approx([0.0, 3e-6])]
     assert np.diag(found["noise"].parts[0].covariance[0]) == pytest.approx([1e-12, 3e-12])
+
+
+def hum(*corners_hz):
+    """Sources whose spectra end at some corners."""
+    return [
+        replace(
+            source("process", process=first_order(0.02, corner, convention="per-axis", name="hum")), name=f"{corner}"
+        )
+        for corner in corners_hz
+    ]
+
+
+@pytest.mark.parametrize(("corners_hz", "lines_hz", "index", "slowest_hz", "fastest_hz"), [
+    ((3.0,), (), ErrorIndex("APE"), 3.0, 3.0),
+    ((3.0, 40.0), (), ErrorIndex("APE"), 3.0, 40.0),
+    ((3.0,), (17.0, 500.0, 0.02), ErrorIndex("APE"), 0.02, 500.0),
+    ((3.0,), (17.0,), ErrorIndex("RPE", 1e-3), 3.0, 1e3),
+    ((40.0, 3.0), (), ErrorIndex("MPE", 25.0), 0.04, 40.0),
+    ((3.0,), (), ErrorIndex("PDE", 0.5, 200.0), 0.005, 3.0),
+])  # fmt: skip
+def test_spectra_reach_thirty_times_beyond_all_that_is_slow_or_fast(
+    corners_hz, lines_hz, index, slowest_hz, fastest_hz
+):
+    lines = [replace(source("periodic", freq_hz=freq), name=f"line of {freq} Hz") for freq in lines_hz]
+    asked = {"own": Requirement(index, axes=(0,), observation_s=1e3 if index.takes == "PDE" else None), "APE": APE}
+    found = judge(stated([*hum(*corners_hz), *lines], asked), None)
+    assert (found.freq_hz[0], found.freq_hz[-1]) == pytest.approx((slowest_hz / 30.0, 30.0 * fastest_hz), rel=1e-9)
+    assert list(found.spectra) == [f"{corner}" for corner in corners_hz]
+    assert found.lines_hz == {f"line of {freq} Hz": freq for freq in lines_hz}
+
+
+@pytest.mark.parametrize(("every", "with_loop"), [(1, True), (3, True), (1, False)])
+def test_the_loop_has_a_spectrum_up_to_half_its_rate_where_it_is_a_source_and_reads_every_sample(
+    monkeypatch, every, with_loop
+):
+    def left(closed, freq_hz):
+        assert every == 1
+        return np.outer(freq_hz, [1.0, 2.0])
+
+    timing, optical = SimpleNamespace(period_s=1e-3), SimpleNamespace(every=every)
+    loop = SimpleNamespace(open=SimpleNamespace(loop=SimpleNamespace(timing=timing, optical=optical)))
+    loop.controller = SimpleNamespace(name="PI")
+    monkeypatch.setattr(assembly, "residual_spectrum", left)
+    monkeypatch.setattr(assembly, "windowed_noise", lambda closed, index: {"noise": np.array([9.0])})
+    monkeypatch.setattr(assembly, "windowed_lines", lambda closed, index: [])
+    found = judge(replace(stated(hum(40.0), {"APE": APE}), with_loop=with_loop), loop)
+    names = [each.name for each in found.judged[0].total.contributions]
+    assert names == (["40.0", "noise"] if with_loop else ["40.0"])
+    low, high = (0.05, 1200.0) if with_loop else (40.0 / 30.0, 1200.0)
+    assert (found.freq_hz[0], found.freq_hz[-1]) == pytest.approx((low, high), rel=1e-9)
+    drawn = with_loop and every == 1
+    assert list(found.spectra) == ["40.0", *(["left by the loop under PI"] if drawn else [])]
+    if drawn:
+        density = found.spectra["left by the loop under PI"]
+        held = found.freq_hz < 500.0
+        assert density[held] == pytest.approx(3.0 * found.freq_hz[held]) and np.isnan(density[~held]).all()
