@@ -422,3 +422,40 @@ def test_the_penalty_without_a_code_counts_the_losses_of_both_ends(tmp_path):
 
     drawn = brentq(lambda each: math.log(mean_ratio(each) / data.receiver.bit_error_ratio), 0.0, 40.0)
     assert found == pytest.approx(drawn, abs=0.1) and drawn > 1.0
+
+
+AHEAD = {"point_ahead.corrected": False, "point_ahead.transverse_velocity": "500 m/s"}
+READ = {
+    "static": ({"communication.coupling": FIBRE | {"pointing_error": "4 urad"}}, AHEAD),
+    "random": ({"communication.coupling": DETECTOR | {"jitter": THEIRS}}, JITTER, AHEAD),
+    "wavefront": (
+        {"communication.coupling": MULTI, "communication.strehl": None, "communication.wavefront_error": "90 nm"},
+        JITTER,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", READ)
+def test_readings_and_ideal_receivers_count_what_the_receiver_and_the_point_ahead_cost(tmp_path, case):
+    """Each is held against the mission that has what was read or found as its own."""
+    rates, errors = [1e8, 3e8], [0.0, 12e-6]
+    wanted = {"communication.data_rate": "250 Mbit/s", "requirement.pointing_error": "7 urad"}
+    m = link_file(tmp_path, NO_BEAMS, *READ[case], wanted).mission
+    data = link.of(m)
+    readings = {(each.pointing_loss, each.strehl): each.photons_per_bit for each in link.implied_sensitivity(data)}
+    maps = link.convention_maps(data, rates, errors)
+    assert maps.keys() == readings.keys() and len(maps) == (2 if case == "wavefront" else 4)
+    for (loss, strehl), margins in maps.items():
+        said = {"conventions.pointing_loss": loss}
+        said |= {} if case == "wavefront" else {"conventions.strehl": strehl}
+        own = link_file(tmp_path, NO_BEAMS, *READ[case], wanted, said).mission
+        np.testing.assert_allclose(margins, link.margin_map(link.of(own), rates, errors), rtol=0, atol=1e-9)
+        if case != "random" or loss == m.conventions.pointing_loss:  # else what is added depends on the reading
+            needed = own.with_value("communication.receiver_sensitivity_photon_bit", readings[loss, strehl])
+            assert float(link.margin_map(link.of(needed), 250e6, 7e-6)[0, 0]) == pytest.approx(3.0, abs=1e-9)
+    for error_rad in (None, 12e-6):
+        for each in link.ideal_receivers(data, {}, error_rad):
+            with_it = m.with_value("communication.receiver_sensitivity_photon_bit", each.photons_per_bit)
+            at = m.communication.pointing_error_rad if error_rad is None else error_rad
+            margin = float(link.margin_map(link.of(with_it), 250e6, at)[0, 0])
+            assert each.margin_db == pytest.approx(margin, abs=1e-9)
