@@ -352,3 +352,15 @@ def test_an_unknown_convention_is_named():
 def test_links_are_met_where_each_requirement_is(monkeypatch, each, all_of_them):
     monkeypatch.setattr(requirement, "of_links", lambda study: [SimpleNamespace(met=met) for met in each])
     assert requirement.met("the study") is all_of_them
+
+
+@pytest.mark.parametrize(("leo_m", "geo_m"), [(0.2, 0.15), (0.15, 0.2)])
+@pytest.mark.parametrize("name", ["communication", "beacon", "answer"])
+def test_the_far_field_begins_where_that_of_the_larger_aperture_does(name, leo_m, geo_m):
+    begins_m = 2.0 * 0.2**2 / getattr(MISSION, name).wavelength_m
+    for share, near in ((0.999, True), (1.0, False)):
+        apertures = {"leo_aperture_m": leo_m, "geo_aperture_m": geo_m}
+        mission = changed(terminals=apertures, **{name: {"distance_m": share * begins_m}})
+        (space,) = (line for line in getattr(budgets, name)(mission, SOURCES).lines if line.name == "Free-space loss")
+        assert space.warning.startswith("nearer than the far field, which begins at ") is near
+        assert not near or space.warning.endswith(f" {begins_m / 1e3:.4g} km")
