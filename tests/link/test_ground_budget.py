@@ -611,3 +611,21 @@ def test_lines_of_the_air_say_what_they_are_and_where_they_come_from(unlike, cas
     lines = lines_with_air(unlike(case))
     written = {f"{x.name} ({x.unit}): {x.basis} | {x.source} | {x.regime} | {x.warning}" for x in lines}
     assert not set(expected) - written
+
+
+@pytest.mark.parametrize("shaken", [{}, {"jitter": None}], ids=["jitter", "still"])
+@pytest.mark.parametrize("table", [PHOTODIODE, FIBRE], ids=["detector", "fibre"])
+def test_a_receiver_that_points_badly_all_the_time_loses_as_much_of_each_fade(tmp_path, table, shaken):
+    def found(*error):
+        coupled = {"communication.coupling": table | dict(error)}
+        data = link.of(ground_file(tmp_path, coupled, shaken).mission)
+        return data, outage.Exposure.stated(data)
+
+    (good, without), (bad, pointed) = found(), found(("pointing_error", "1.5 urad"))
+    lost = bad.receiving.end.worst_loss_db(1.5e-6) - float(bad.receiving.end.loss_db(0.0))
+    assert lost > 0.01 and bad.receive_pointing_db == pytest.approx(lost, abs=1e-12)
+    assert bad.fade_db == pytest.approx(good.fade_db, abs=1e-9) and good.fade_db > 0.1
+    assert without.margin_db - pointed.margin_db == pytest.approx(lost, abs=1e-9)
+    assert pointed.received_mean_db - without.received_mean_db == pytest.approx(lost, abs=1e-9)
+    for margin_db in (without.margin_db - 3.0, without.margin_db - 0.5):
+        assert pointed.short_of(margin_db - lost) == pytest.approx(without.short_of(margin_db), rel=1e-9)

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from microrad.link.pointing import fading as pf
 from microrad.link.pointing import statistics as ps
-from microrad.link.radial_error import Jitter
+from microrad.link.radial_error import Jitter, radial_survival
 
 URAD = 1e-6
 THETA = 10.0 * URAD
@@ -628,3 +628,22 @@ def test_a_refusal_of_a_motion_or_a_divergence_is_one_whole_sentence(found, expe
 ])  # fmt: skip
 def test_a_spectrum_that_ends_too_early_says_how_much_of_its_motion_that_is(found, expected):
     assert found() == expected
+
+
+@pytest.mark.parametrize("rms_urad", [(3.0, 0.0), (0.0, 3.0), (3.0, 1.5), (2.0, 2.0)])
+def test_neither_the_side_of_a_bias_nor_the_order_of_the_axes_counts(rms_urad):
+    """Of an axis that stands still, too; its velocity goes with each axis."""
+    bias, speed = (1.2, 2.1), tuple(100.0 * rms * (1.0 + axis) for axis, rms in enumerate(rms_urad))
+    radius = np.array([0.5, 1.9, 2.5, 4.0, 9.0]) * URAD
+
+    def found(x, y, first=0):
+        order = [first, 1 - first]
+        of_axes = [[values[axis] * URAD for axis in order] for values in ((x * bias[0], y * bias[1]), rms_urad, speed)]
+        jitter, velocity = Jitter(tuple(of_axes[0]), tuple(of_axes[1])), tuple(of_axes[2])
+        return np.array([pf.level_crossing_rate_hz(jitter, velocity, radius), radial_survival(jitter, radius)])
+
+    wanted = found(1.0, 1.0)
+    assert np.count_nonzero(wanted[0]) >= 3
+    for x, y in ((1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+        np.testing.assert_allclose(found(x, y), wanted, rtol=1e-9, atol=1e-300)
+        np.testing.assert_allclose(found(x, y, 1), wanted, rtol=1e-9, atol=1e-300)
