@@ -830,3 +830,24 @@ def test_a_few_words_none_of_which_is_lost_have_the_interval_of_as_many_trials(w
     found = coded_module._share(np.zeros(words, dtype=bool))
     assert (found.value, found.low, found.high) == (0.0, 0.0, pytest.approx(high, abs=1e-4))
     assert high == pytest.approx(1.0 - 0.005 ** (1.0 / words), abs=1e-4)
+
+
+@pytest.mark.parametrize("unit", ["linear", "dB"])
+@pytest.mark.parametrize("normalised", ["mean", "largest", "as-given"])
+def test_powers_are_a_copy_that_nobody_writes_into(unit, normalised):
+    given = np.linspace(0.5, 1.5, 300)
+    series = series_of(given, unit=unit, normalised=normalised)
+    before = series.power.copy()
+    for power in (series.power, part(series, 10, 250).power):
+        with pytest.raises(ValueError, match="read-only"):
+            power[0] = 7.0
+    given[:] = 9.0
+    np.testing.assert_array_equal(series.power, before)
+
+
+def test_a_part_of_a_series_is_on_its_scale_and_keeps_what_is_said_of_it():
+    series = FadeSeries.of(np.arange(1.0, 401.0), 2e-3, "a.csv", unit="linear", normalised="largest", sha256="abc")
+    some = part(series, 100, 300)
+    assert (some.period_s, some.source, some.normalised, some.sha256) == (2e-3, "a.csv", "largest", "abc")
+    assert some.power.tolist() == pytest.approx([k / 400.0 for k in range(101, 301)])
+    assert some.duration_s == pytest.approx(0.4)

@@ -15,7 +15,7 @@ from microrad.link import study as link_study
 from microrad.link.ground import ground_link
 from microrad.link.pointing import outage
 from microrad.link.turbulence import HufnagelValley
-from microrad.link.variation import divergence_possible
+from microrad.link.variation import beam_tornado, divergence_possible
 
 deg = math.pi / 180.0
 DB = 10.0 / math.log(10.0)
@@ -629,3 +629,34 @@ def test_a_receiver_that_points_badly_all_the_time_loses_as_much_of_each_fade(tm
     assert pointed.received_mean_db - without.received_mean_db == pytest.approx(lost, abs=1e-9)
     for margin_db in (without.margin_db - 3.0, without.margin_db - 0.5):
         assert pointed.short_of(margin_db - lost) == pytest.approx(without.short_of(margin_db), rel=1e-9)
+
+
+def test_the_margin_of_an_answer_through_the_air_moves_with_all_that_it_goes_through(tmp_path):
+    changes = TYPED, {"channel.station": "leo", "point_ahead.corrected": False}, STATIC
+    file = ground_file(tmp_path, *changes)
+    found = {each.key: each for each in beam_tornado(file.mission, file.sources, "answer")}
+    keys = {f"answer.{key}" for key in ("wavelength", "divergence", "pointing_error", "wavefront_error")}
+    keys |= {f"answer.{key}" for key in ("transmit_power", "required_power")}
+    keys |= {f"answer.{key}" for key in ("transmit_optics_loss", "receive_optics_loss")}
+    keys |= {f"channel.{key}" for key in ("absorption", "aerosol_depth", "angstrom_exponent")}
+    keys |= {f"channel.{key}" for key in ("elevation", "altitude", "height")}
+    keys |= {f"channel.turbulence.{key}" for key in ("ground_strength", "wind_rms")}
+    keys |= {"terminals.leo_aperture", "point_ahead.transverse_velocity", "requirement.outage"}
+    assert found.keys() == keys
+    outage_of = file.mission.requirement.outage
+    assert (found["requirement.outage"].low, found["requirement.outage"].high) == pytest.approx(
+        (outage_of / 10.0, outage_of * 10.0), rel=1e-12
+    )
+    for key, unit, scale in (
+        ("requirement.outage", None, 1.0),
+        ("channel.elevation", "deg", 1.0 / deg),
+        ("channel.altitude", "m", 1.0),
+        ("channel.turbulence.wind_rms", "m/s", 1.0),
+        ("point_ahead.transverse_velocity", "m/s", 1.0),
+    ):
+        each = found[key]
+        for value, margin_db in ((each.low, each.margin_low_db), (each.high, each.margin_high_db)):
+            given = value if unit is None else f"{value * scale!r} {unit}"
+            m = ground_file(tmp_path, *changes, {key: given}).mission
+            moved = link.beam_budget("answer", link.Shared.of(m), m.answer, {}).margin_db
+            assert moved == pytest.approx(margin_db, abs=1e-8), key

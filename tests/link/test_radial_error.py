@@ -273,3 +273,13 @@ AT_REST = Jitter((3.0 * URAD, -4.0 * URAD), (0.0, 0.0))
 ])  # fmt: skip
 def test_errors_of_one_axis_and_of_hardly_any_have_their_probabilities(found, expected):
     assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize("rms", [(0.0, 0.0), (2e-6, 1e-6)])
+def test_steps_that_all_share_are_made_once_and_nobody_writes_into_them(rms):
+    jitter = Jitter((3e-6, -4e-6), rms)
+    radius, share = radial_steps(jitter)
+    assert radial_steps(Jitter((3e-6, -4e-6), rms))[0] is radius
+    for each in (radius, share):
+        with pytest.raises(ValueError, match="read-only"):
+            each[0] = 1.0
