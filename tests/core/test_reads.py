@@ -315,3 +315,38 @@ def test_arguments_beside_and_what_has_no_digest_are_known_for_what_they_are():
     assert (result, reads.known, list(reads.digests)) == ((1.5, object), True, [()])
     _, reads = watched_call(lambda m, x: m.beam.power_w, MISSION, iter([]))
     assert not reads.known
+
+
+LISTED = replace(
+    MISSION,
+    beams=[Beam(1.0), Beam(2.0)],
+    sources={"a": [Beam(3.0), Beam(4.0)], "b": (Beam(5.0),), "c": [[Beam(6.0)], [Beam(7.0)]]},
+)
+
+
+@pytest.mark.parametrize(
+    ("function", "seen", "unseen"),
+    [
+        (lambda m: m.beams[0].power_w, {"beams": [Beam(9.0), Beam(2.0)]}, {"beams": [Beam(1.0), Beam(9.0)]}),
+        (lambda m: m.beams[1].power_w, {"beams": [Beam(1.0)]}, {"beams": [Beam(1.0, 9.0), Beam(2.0, 9.0)]}),
+        (lambda m: len(m.beams), {"beams": (Beam(1.0), Beam(2.0))}, {"beams": [Beam(8.0), Beam(9.0)]}),
+        (
+            lambda m: m.sources["a"][1].power_w,
+            {"sources": {**LISTED.sources, "a": [Beam(3.0), Beam(9.0)]}},
+            {"sources": {**LISTED.sources, "a": [Beam(9.0), Beam(4.0)], "b": ()}},
+        ),
+        (
+            lambda m: m.sources["c"][1][0].power_w,
+            {"sources": {**LISTED.sources, "c": [[Beam(6.0)], [Beam(9.0)]]}},
+            {"sources": {**LISTED.sources, "c": [[Beam(9.0)], [Beam(7.0)]]}},
+        ),
+        (
+            lambda m: sorted(m.sources),
+            {"sources": {name: LISTED.sources[name] for name in ("b", "a", "c")}},
+            {"sources": {"a": [], "b": [Beam(1.0)], "c": ()}},
+        ),
+    ],
+)
+def test_of_records_in_lists_and_in_lists_of_a_mapping_those_that_are_read_count(function, seen, unseen):
+    assert not agree(function, replace(LISTED, **seen), LISTED)
+    assert agree(function, replace(LISTED, **unseen), LISTED)

@@ -583,3 +583,19 @@ def test_a_receiver_moves_as_its_jitter_says_and_without_one_as_its_twin_does():
     assert link_performance._moving(data, sent, lost_db) is None
     data.receiving = None
     assert link_performance._moving(data, sent, lost_db) is None
+
+
+@pytest.mark.parametrize(("bias_urad", "rms_urad", "ahead_urad", "shifted_urad"), [
+    ((3.0, -4.0), (1.0, 2.0), 5.0, (6.0, -8.0)),
+    ((0.0, -2.0), (3.0, 1.0), 1.5, (0.0, -3.5)),
+    ((0.0, 0.0), (1.0, 2.0), 5.0, (0.0, 5.0)),
+    ((0.0, 0.0), (2.0, 1.0), 5.0, (5.0, 0.0)),
+    ((0.0, 0.0), (2.0, 2.0), 5.0, (5.0, 0.0)),
+    ((3.0, -4.0), (2.0, 1.0), 0.0, (3.0, -4.0)),
+])  # fmt: skip
+def test_a_point_ahead_makes_a_bias_longer_and_lies_along_the_wider_axis_without_one(
+    bias_urad, rms_urad, ahead_urad, shifted_urad
+):
+    found = link_performance.with_point_ahead(record(bias_urad, rms_urad), ahead_urad * URAD)
+    assert found.bias_rad == pytest.approx([each * URAD for each in shifted_urad], rel=1e-12, abs=1e-18)
+    assert found.rms_rad == tuple(each * URAD for each in rms_urad)

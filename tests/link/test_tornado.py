@@ -478,3 +478,22 @@ def test_an_input_is_moved_within_its_bounds(found, expected):
 ])  # fmt: skip
 def test_inputs_at_their_edges_move_within_these_bounds(found, expected):
     assert list(found()) == pytest.approx([float(each) for each in expected.split()], rel=1e-6, abs=0.0, nan_ok=True)
+
+
+def test_each_axis_of_a_jitter_has_the_source_of_its_key_and_its_place_behind_it(tmp_path):
+    file = link_file(tmp_path, JITTER, NO_BEAMS)
+    told = {"bias": "datasheet: Table 1", "rms": "assumption: as on the ground"}
+    sources = file.sources | {
+        f"jitter.{key}": replace(file.sources[f"jitter.{key}"], comment=text) for key, text in told.items()
+    }
+    found = link.swings(
+        file.mission, sources, ("jitter",), "ratio", lambda m: 1e6 * sum(m.jitter.rms_rad + m.jitter.bias_rad), bool
+    )
+    assert [(each.key, each.source) for each in found] == [
+        ("jitter.rms.1", told["rms"]),
+        ("jitter.rms.2", told["rms"]),
+        ("jitter.bias.1", told["bias"]),
+    ]
+    assert [each.kind for each in found] == [sources[each.key[:-2]].kind for each in found]
+    assert found[0].kind == "assumption"
+    assert [each.swing_db for each in found] == pytest.approx([0.6, 0.4, 0.2], rel=1e-9)
