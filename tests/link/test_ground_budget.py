@@ -11,6 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from ground_files import FIBRE, PHOTODIODE, STILL, TYPED, UP, WIND, ground_file
 from microrad import link
+from microrad.link import ground
 from microrad.link import study as link_study
 from microrad.link.ground import ground_link
 from microrad.link.pointing import outage
@@ -660,3 +661,62 @@ def test_the_margin_of_an_answer_through_the_air_moves_with_all_that_it_goes_thr
             m = ground_file(tmp_path, *changes, {key: given}).mission
             moved = link.beam_budget("answer", link.Shared.of(m), m.answer, {}).margin_db
             assert moved == pytest.approx(margin_db, abs=1e-8), key
+
+
+BEACON = {
+    "transmit_power": "2 W",
+    "wavelength": "0.85 um",
+    "divergence": "300 urad",
+    "strehl": 0.9,
+    "pointing_error": "30 urad",
+    "transmit_optics_loss": "0.5 dB",
+    "receive_optics_loss": "0.7 dB",
+    "required_power": "10 pW",
+}
+
+
+def wander_by_hand(path, waist_m):
+    rayleigh_m = math.pi * waist_m**2 / path.wavelength_m
+
+    def shape(z):
+        return (1.0 - z / path.range_m) ** 2 * (waist_m * math.hypot(1.0, z / rayleigh_m)) ** (-1.0 / 3.0)
+
+    return math.sqrt(2.07 * path.over(shape))
+
+
+@pytest.mark.parametrize(("changes", "upwards"), [((), {"Answer"}), ((UP,), {"Communication", "Beacon"})])
+def test_each_of_three_beams_has_its_own_air_downwards_or_upwards(tmp_path, monkeypatch, changes, upwards):
+    """Figures by the wavelength, the receiving aperture and the divergence of each."""
+    monkeypatch.setattr(ground, "_CONVENTIONS", ("fades",))
+    monkeypatch.setattr(ground, "_ELEVATIONS_DEG", ())
+    log_normal = {"channel.turbulence.fades": "log-normal", "jitter": None}
+    file = ground_file(tmp_path, *changes, log_normal, {"beacon": BEACON, "communication.coupling": None})
+    m = file.mission
+    g = ground_link(m, file.sources, link.of(m))
+    assert [name for name, _ in g.beams] == ["Communication", "Beacon", "Answer"]
+    apertures = {"Communication": 0.4, "Beacon": 0.4, "Answer": 0.05}
+    for name, lines in g.beams:
+        of = {line.name: line.value for line in lines}
+        wavelength = getattr(m, name.lower()).wavelength_m
+        path = Path(wavelength, m.path.elevation_rad)
+        assert of["Fried's parameter"] == pytest.approx(path.r0, rel=1e-6)
+        if name in upwards:
+            assert "Angle of arrival" not in of
+            half = {"Beacon": 150e-6, "Answer": 100e-6}.get(name, link.of(m).beam.fall.half_angle_rad)
+            waist = wavelength / (math.pi * half)
+            assert of["Beam wander"] == pytest.approx(wander_by_hand(path, waist), rel=1e-5)
+        else:
+            assert "Beam wander" not in of
+            diameter = apertures[name]
+            arrival = math.sqrt(0.18164 * (diameter / path.r0) ** (5.0 / 3.0)) * wavelength / diameter
+            assert of["Angle of arrival"] == pytest.approx(arrival, rel=1e-6)
+    (fades,) = g.conventions
+    other = ground_file(tmp_path, *changes, log_normal, {"beacon": BEACON, "communication.coupling": None}, {
+        fades.key: fades.other}).mission  # fmt: skip
+    assert list(fades.gained_db) == ["Communication", "Beacon", "Answer"]
+    for name in ("beacon", "answer"):
+        was, now = (
+            link.beam_budget(name, link.Shared.of(each), getattr(each, name), {}).margin_db for each in (m, other)
+        )
+        assert fades.gained_db[name.capitalize()] == pytest.approx(now - was, abs=1e-9)
+    assert len({round(gained, 6) for gained in fades.gained_db.values()}) == 3
