@@ -19,6 +19,7 @@ from microrad.link.error_budget.distributions import Bundle, case
 from microrad.link.error_budget.sources import ErrorSource, Spread
 from microrad.loop.disturbance import Disturbance, SpectralLine, first_order, olympus
 from microrad.loop.disturbance.windows import ErrorIndex, Motion, windowed_rms
+from microrad.mission.model import Source
 from microrad.mission.source_list import read_sources
 from microrad.mission.tables.error_budget import BudgetRequirement, BudgetSource
 from places import ROOT
@@ -1439,3 +1440,49 @@ def test_the_loop_has_a_spectrum_up_to_half_its_rate_where_it_is_a_source_and_re
         density = found.spectra["left by the loop under PI"]
         held = found.freq_hz < 500.0
         assert density[held] == pytest.approx(3.0 * found.freq_hz[held]) and np.isnan(density[~held]).all()
+
+
+def of_table(**others):
+    """A source of a mission's table."""
+    given = {**NO_TIMES, "statistic": "3-sigma", "gains": (1.0, 1.0), "axes": "together", **others}
+    return BudgetSource.model_construct(**given)
+
+
+def test_each_source_of_a_table_comes_from_the_line_with_its_size_or_rate():
+    table = SimpleNamespace(
+        sources={
+            "ramp": of_table(kind="drift", rate_rad_s=3e-9, period_s=50.0),
+            "bench": of_table(kind="constant", size_rad=6e-6),
+            "hum": of_table(kind="process", statistic="1-sigma", size_rad=4e-6, corner_hz=3.0),
+        }
+    )
+    lines = {
+        "error_budget.sources.ramp.rate": Source(3, "datasheet: Table 1"),
+        "error_budget.sources.ramp.size": Source(4, "of another"),
+        "error_budget.sources.bench.size": Source(5, "", "6 urad", "bench.toml"),
+    }
+    found = assembly.sources_of(table, lines)
+    assert [(each.name, each.kind, each.origin) for each in found] == [
+        ("ramp", "drift", "datasheet: Table 1"),
+        ("bench", "constant", "bench.toml, line 5"),
+        ("hum", "process", "not stated"),
+    ]
+    assert [(each.size.mean, each.size.width) for each in found] == [
+        pytest.approx(pair) for pair in ((0.0, 1e-9), (0.0, 2e-6), (4e-6, 0.0))
+    ]
+
+
+@pytest.mark.parametrize(("axes", "places"), [("x", (0,)), ("y", (1,)), ("z", (2,)), ("radial", (0, 1))])
+def test_a_requirement_is_about_the_axes_that_its_table_names(axes, places):
+    asked = ASKED.model_copy(update={"axes": axes})
+    assert requirement_of(asked) == replace(requirement_of(ASKED), axes=places)
+
+
+def test_correlations_of_a_table_stand_in_its_order_and_are_none_without_one():
+    given = {
+        "late": SimpleNamespace(first="c", second="a", coefficient=-0.25),
+        "early": SimpleNamespace(first="a", second="b", coefficient=0.5),
+    }
+    found = assembly.correlations_of(SimpleNamespace(correlations=given))
+    assert found == (Correlation("c", "a", -0.25), Correlation("a", "b", 0.5))
+    assert assembly.correlations_of(SimpleNamespace(correlations=None)) == assembly.correlations_of(None) == ()
