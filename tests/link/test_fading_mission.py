@@ -16,6 +16,7 @@ from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fa
 from microrad.link.requirement import UNDER_FADES, of_links
 from microrad.link.study import run_link_study
 from microrad.mission.file import MissionError, named_files, with_contents
+from microrad.mission.model import Source
 from microrad.report.links.figures import link_figures
 from microrad.report.links.views import cost_text, links_views
 from microrad.report.plotting.figure import Figure
@@ -291,3 +292,33 @@ def test_a_series_is_read_again_where_its_file_has_changed_in_size_or_time(tmp_p
     place.unlink()
     with pytest.raises(FadeSeriesError):
         of_mission.series_of(table, tmp_path)
+
+
+@pytest.mark.parametrize(("source", "where"), [
+    (None, "communication.fading: "),
+    (Source(7, "paper: Fig. 3", '"absent.csv"'), "communication.fading, mission file, line 7: "),
+    (Source(12, "", '"absent.csv"', "station.toml"), "communication.fading, station.toml, line 12: "),
+])  # fmt: skip
+def test_a_series_that_is_not_there_is_told_by_the_file_and_the_line_that_name_it(tmp_path, source, where):
+    data = link.of(link_file(tmp_path, fading(series="absent.csv")).mission)
+    sources = {"communication.fading.unit": Source(3, "", '"linear"')}
+    sources |= {} if source is None else {"communication.fading.series": source}
+    with pytest.raises(FadeSeriesError) as refused:
+        of_mission.fading_of(data, tmp_path, sources)
+    assert str(refused.value).startswith(f"{where}{tmp_path / 'absent.csv'}: there is no such file")
+
+
+@pytest.mark.parametrize(("others", "kind", "span_s"), [
+    ({"interleaving": "none", "interleaver": None}, "none", 0.0),
+    ({"interleaving": "convolutional", "interleaver": "3 ms"}, "convolutional", 3e-3),
+])  # fmt: skip
+def test_the_code_of_a_mission_is_spread_as_its_table_says(tmp_path, monkeypatch, others, kind, span_s):
+    fades(tmp_path)
+    file = link_file(tmp_path, fading(**others))
+    data, asked = link.of(file.mission), []
+    monkeypatch.setattr(of_mission, "coded_fading", lambda *given: asked.append(given) or "found")
+    assert of_mission.fading_of(data, tmp_path, file.sources) == "found"
+    ((coded, margin_db, target),) = asked
+    assert (coded.interleaving, coded.span_s, coded.code.name) == (kind, span_s, "ccsds-k7-1-2")
+    assert (coded.series.source, coded.series.normalised, coded.data_rate_bit_s) == ("fades.csv", "mean", 300e6)
+    assert margin_db == link.communication_budget(data, {}).margin_db and target == TARGET

@@ -720,3 +720,38 @@ def test_each_of_three_beams_has_its_own_air_downwards_or_upwards(tmp_path, monk
         )
         assert fades.gained_db[name.capitalize()] == pytest.approx(now - was, abs=1e-9)
     assert len({round(gained, 6) for gained in fades.gained_db.values()}) == 3
+
+
+@pytest.mark.parametrize(("velocity", "modes", "doubted"), [(7500.0, 7, True), (300.0, 7, False), (7500.0, 0, False)])
+def test_adaptive_optics_that_measures_other_air_is_doubted_of_an_uplink_alone(tmp_path, velocity, modes, doubted):
+    changes = {"channel.turbulence.corrected_modes": modes, "point_ahead.transverse_velocity": f"{velocity} m/s"}
+    m = ground_file(tmp_path, changes).mission
+    shared = link.Shared.of(m)
+    path = Path(m.answer.wavelength_m, m.path.elevation_rad)
+    isoplanatic = (2.914 * path.k**2 * path.over(lambda z: z ** (5.0 / 3.0))) ** -0.6
+    angle = 2.0 * velocity / LIGHT_M_S
+    assert (angle > isoplanatic) is (velocity > 1e3)
+    found = [each for each in shared.turbulent(m.answer, "geo", 100e-6, None).doubts if "point-ahead" in each]
+    said = f"the point-ahead angle is {angle / isoplanatic:.2g} isoplanatic angles: adaptive optics measures other air"
+    assert found == ([f"{said} than the beam goes through"] if doubted else [])
+    assert not any("point-ahead" in each for each in link.of(m).turbulent.doubts)
+
+
+@pytest.mark.parametrize(("table", "modes", "doubted"), [
+    (FIBRE, 3, True),
+    (FIBRE, 0, False),
+    (FIBRE, 200, False),
+    (PHOTODIODE, 3, False),
+    (PHOTODIODE, 4, True),
+])  # fmt: skip
+def test_a_correction_that_leaves_more_than_a_radian_is_doubted_where_it_counts(tmp_path, table, modes, doubted):
+    """Piston and tilts are no correction to a disk, which follows them: its own closed form holds."""
+    still = {"jitter": None, "terminals.geo_aperture": "1.2 m"}
+    m = ground_file(tmp_path, STATIC, still, {
+        "communication.coupling": table, "channel.turbulence.corrected_modes": modes}).mission  # fmt: skip
+    over = (1.2 / Path(1.55e-6, m.path.elevation_rad).r0) ** (5.0 / 3.0)
+    noll = {0: 1.0299, 3: 0.134, 4: 0.111, 200: 0.2944 * 200.0 ** (-math.sqrt(3.0) / 2.0)}
+    left = noll[modes] * over
+    found = [each for each in link.of(m).turbulent.doubts if "Marechal" in each]
+    assert found == ([f"a residual of {math.sqrt(left):.2g} rad rms, above 1: Marechal's ends"] if doubted else [])
+    assert (left > 1.0) is (modes < 100)
