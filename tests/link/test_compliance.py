@@ -517,3 +517,60 @@ def test_a_name_that_no_standard_has_is_answered_with_the_nearest(call, error, w
     with pytest.raises(error) as refused:
         call()
     assert str(refused.value) == words
+
+
+MOVED = "by the square of the distance"
+GIVEN_BY_SENSITIVITY = "the mission gives its receiver by receiver_sensitivity, not by communication.receiver"
+WIDE = (
+    "90 % of those that end in lock take no longer; 99.8 % of all searches by wide beacon end in lock",
+    f"beacon at beacon.pointing_error, from 44000 km to 5500 km {MOVED}",
+    f"at communication.pointing_error, which is static, from 42000 km to 5500 km {MOVED}",
+    f"at communication.pointing_error, which is static, from 42000 km to 20000 km {MOVED}",
+    "on the axis at 42000 km; nearer than 610.5 km there is more than is allowed",
+    "communication.transmit_power behind transmit_optics_loss",
+    "sqrt(2 ln 2) times the half angle of 19.74 µrad at 1/e2 by conventions.pointing_loss",
+    "communication.wavelength",
+    "channel n = 3 is at 1.550116 µm; the wavelength has too few digits for channels 800 pm apart",
+    GIVEN_BY_SENSITIVITY,
+    GIVEN_BY_SENSITIVITY,
+    GIVEN_BY_SENSITIVITY,
+    "by a sensitivity as measured, whose bit error ratio is not stated",
+    "communication.data_rate, one way",
+)
+SHAKEN = (
+    "a search for the partner needs the tables beacon, answer and acquisition",
+    "the mission has no table beacon",
+    f"mean under the jitter, from 42000 km to 5500 km {MOVED}",
+    f"mean under the jitter, from 42000 km to 20000 km {MOVED}",
+    "on the axis at 42000 km; nearer than 454.9 km there is more than is allowed",
+    "communication.transmit_power behind transmit_optics_loss and the cut of the aperture",
+    "of the far field of the lit aperture",
+    "communication.wavelength",
+    "channel n = 3 is at 1.550116 µm",
+    "communication.receiver.modulation",
+    "communication.receiver.bandwidth",
+    "communication.receiver.code_rate",
+    "for a bit error ratio of 1e-06 with communication.receiver.code_gain, at 300 Mbit/s",
+    "communication.data_rate, one way",
+)
+LIT_AND_SHAKEN = (BARE, JITTER, PATTERN, {"communication.beam": GAUSSIAN}, received_with("apd ook"))
+LIT_AND_SHAKEN = (*LIT_AND_SHAKEN, {"communication.wavelength": "1550.12 nm"})
+
+
+@pytest.mark.parametrize(("changes", "said"), [((QUICK,), WIDE), (LIT_AND_SHAKEN, SHAKEN)], ids=["wide", "shaken"])
+def test_each_row_says_how_its_value_comes_about_or_what_the_mission_would_have_to_say(studied, changes, said):
+    held = compliance.compliance(studied(*changes), SDA).held
+    assert tuple(each.why for each in held if not each.asked.outside) == said
+    assert {each.asked.key for each in held if each.why == each.asked.outside} == {
+        "payload_code", "frame", "tracking_tone",
+    }  # fmt: skip
+
+
+def test_a_mission_that_scans_has_the_edge_of_its_beam_and_its_scan_named(studied):
+    found = studied({"acquisition.runs": 100, "beacon.strehl": 0.0})
+    m = found.file.mission
+    scans = m.model_copy(update={"operations": m.operations.model_copy(update={"acquisition": "scan"})})
+    by_scan = replace(found, file=replace(found.file, mission=scans))
+    edge = f"edge of the scan's beam, from 44000 km to 5500 km {MOVED}"
+    assert row(by_scan, "acquisition_irradiance").why == edge
+    assert row(by_scan, "acquisition_time").why.endswith(f" of all searches by {found.finding.scan.name} end in lock")

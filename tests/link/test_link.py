@@ -14,9 +14,11 @@ import budgets
 from link_files import link_file
 from microrad import link
 from microrad.core.budget import total_db
+from microrad.core.units import format_quantity
 from microrad.link import gains, requirement
 from microrad.link import study as link_study
 from microrad.mission.file import load_mission
+from microrad.mission.model import Source
 from microrad.mission.tables.channel import Channel
 from microrad.report.links import words as links_words
 from places import ROOT
@@ -364,3 +366,30 @@ def test_the_far_field_begins_where_that_of_the_larger_aperture_does(name, leo_m
         (space,) = (line for line in getattr(budgets, name)(mission, SOURCES).lines if line.name == "Free-space loss")
         assert space.warning.startswith("nearer than the far field, which begins at ") is near
         assert not near or space.warning.endswith(f" {begins_m / 1e3:.4g} km")
+
+
+def test_ideal_receivers_have_their_formulas_and_say_where_rate_and_error_come_from():
+    sources = {"communication.data_rate": Source(7, "paper: 2.2"), "communication.pointing_error": Source(9, "")}
+    for error_rad, said in ((None, "mission file, line 9"), (0.0, "chosen for this evaluation")):
+        found = link.ideal_receivers(link.of(MISSION), sources, error_rad)
+        assert [(each.formula, each.source) for each in found] == [
+            ("BER = erfc(sqrt(2 n)) / 2", f"paper: 2.2; {said}"),
+            ("BER = exp(-n) / 2", f"paper: 2.2; {said}"),
+            ("BER = exp(-2 n) / 2, n averaged over marks and spaces", f"paper: 2.2; {said}"),
+        ]
+
+
+@pytest.mark.parametrize(("margin_db", "instead"), [
+    (20.0, "up to {rate} it would be there, or with that much more power or gain"),
+    (200.0, "it would be there with that much more power or gain"),
+])  # fmt: skip
+def test_a_margin_that_is_missed_on_the_axis_is_told_with_the_rate_that_has_it(margin_db, instead):
+    data = link.of(MISSION)
+    missed = margin_db - float(link.margin_map(data, 300e6, 0.0)[0, 0])
+    rate = format_quantity(300e6 * 10.0 ** (-missed / 10.0), "bit/s")
+    with pytest.raises(link.LinkError) as refused:
+        link.largest_pointing_error(data, margin_db, 300e6)
+    assert str(refused.value) == (
+        f"at 300 Mbit/s a margin of {margin_db:g} dB is missed by {missed:.2f} dB even without pointing error; "
+        + instead.format(rate=rate)
+    )

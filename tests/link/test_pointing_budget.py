@@ -758,3 +758,23 @@ def test_a_refusal_of_a_stated_error_is_one_whole_sentence(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+def test_each_rule_says_what_it_is_of_its_formula_and_who_authorises_it():
+    terms = [ErrorTerm("one", "random", 3e-6, (0.0, 0.0), (1e-6, 1e-6))]
+    ecss, alone = "ECSS-E-ST-60-10C (2008)", "terms uncorrelated"
+    found = summation.summations(terms, 0.9)
+    assert [(each.rule, each.name, each.of, each.formula, each.authority) for each in found] == [
+        ("rss", "root sum square", "stated", "sqrt(sum of error^2)",
+         f"the paper, section 2.1; {ecss} 4.2.3 only for uncorrelated deviations of one level without a mean"),
+        ("esa-1993", "class by class", "stated", "sum over the classes of sqrt(sum of error^2)",
+         "earlier ESA practice, Pointing Error Handbook ESA-NCR-502 (1993)"),
+        ("ecss-axis", "ECSS, one axis", "axis", "abs(sum of means) + n_p sqrt(sum of sigma^2), the worse axis",
+         f"{ecss} 4.2.3 and 4.2.4.1; {alone}"),
+        ("ecss-radial", "ECSS, two axes", "radial", "sqrt(mean_x^2 + mean_y^2) + n_p sqrt(sigma_x^2 + sigma_y^2)",
+         f"{ecss} 4.2.3 and 4.2.4.2.1, which calls it extremely conservative; {alone}"),
+        ("rayleigh", "ECSS, two like axes", "radial", "max(sigma_x, sigma_y) sqrt(-2 ln(1 - P))",
+         f"{ecss} 4.2.4.2.2, means far below the deviations"),
+        ("exact", "radial distribution", "radial", "P(r < total) = P of a Gaussian about the mean, axes independent",
+         "the reference for the rules; a sum of many errors (central limit theorem)"),
+    ]  # fmt: skip
