@@ -1486,3 +1486,37 @@ def test_correlations_of_a_table_stand_in_its_order_and_are_none_without_one():
     found = assembly.correlations_of(SimpleNamespace(correlations=given))
     assert found == (Correlation("c", "a", -0.25), Correlation("a", "b", 0.5))
     assert assembly.correlations_of(SimpleNamespace(correlations=None)) == assembly.correlations_of(None) == ()
+
+
+HUM = first_order(0.02, 3.0, convention="per-axis", name="hum")
+THROUGH = lti.StateSpace(np.array([[-4.0]]), np.array([[1.0]]), np.array([[4.0]]), np.array([[0.0]]))
+
+
+@pytest.mark.parametrize(("made", "said"), [
+    (
+        lambda: replace(
+            source("process", process=HUM),
+            size=Spread("gaussian", 1.0, 0.2),
+            process=replace(HUM, lines=(SpectralLine(3.0, 1e-6),)),
+        ),
+        "a process error: the lines of a process have one size; give them as periodic errors instead",
+    ),
+    (
+        lambda: source("constant", gains=THROUGH, apart=True),
+        "a constant error: errors apart by axis need gains; give a source for each axis instead",
+    ),
+    (
+        lambda: source("constant", gains=replace(THROUGH, A=np.array([[0.5]]))),
+        "a constant error: its transfer has a pole of 0.5 rad/s; give a stable system of one input",
+    ),
+    (
+        lambda: contribution(
+            source("transient", gains=THROUGH, period_s=40.0, decay_s=0.25), Requirement(ErrorIndex("APE"), axes=(0,))
+        ),
+        "a transient error: its time constant of 0.25 s is a pole of its transfer; move one by 0.1 %",
+    ),
+])  # fmt: skip
+def test_a_source_that_nothing_is_known_of_is_refused_in_one_whole_sentence(made, said):
+    with pytest.raises(ValueError) as refused:
+        made()
+    assert str(refused.value) == said

@@ -684,3 +684,37 @@ FEW_MODES = Coupling.model_construct(core_radius_m=12.5e-6, numerical_aperture=0
 ])  # fmt: skip
 def test_what_is_doubted_of_a_beam_is_said_with_its_numbers(found, expected):
     assert found() == expected
+
+
+@pytest.mark.parametrize(("changes", "expected"), [
+    (
+        {"conventions.pointing_loss": "gain", "point_ahead": None, "communication.strehl": None,
+         "communication.wavefront_error": "350 nm"},
+        {
+            "Strehl loss": "-8.742: exp(-(2 pi s / lambda)^2), s = 350 nm rms | mission file | on axis, small "
+            "wavefront error (Marechal) | beyond 5 dB a beam has no core to speak of",
+            "Pointing loss": "-4.460: exp(-G error^2), G = (pi D / lambda)^2, error = 10 µrad | mission file | beam "
+            "that falls off as a Gaussian set by its own gain; static error | ",
+            "Point-ahead loss": "0.000: taken as corrected | not given | added to the pointing error in its worst "
+            "direction | left at 0 dB",
+        },
+    ),
+    (
+        {"conventions.pointing_loss": "pattern", "communication.beam": {"profile": "uniform"},
+         "terminals.leo_obscuration": 0.25},
+        {
+            "Illumination": "-0.280: 1 - e^2, lit evenly over the open area, e = 0.25 | mission file | power counted "
+            "behind the aperture | ",
+            "Strehl loss": "-0.400: as given in dB | mission file | on axis, small wavefront error (Marechal) | ",
+            "Point-ahead loss": "0.000: corrected; what that leaves is for the pointing error to hold | mission file | "
+            "added to the pointing error in its worst direction | ",
+        },
+    ),
+])  # fmt: skip
+def test_lines_of_other_conventions_say_what_they_are_and_where_they_hold(read, changes, expected):
+    """Each line as value, basis, source without its place, regime and warning."""
+    found = {line.name: line for line in budget_of(read(changes)).lines}
+    for name, said in expected.items():
+        line = found[name]
+        source = line.source.partition(",")[0]
+        assert f"{line.value:.3f}: {line.basis} | {source} | {line.regime} | {line.warning}" == said

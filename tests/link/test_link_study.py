@@ -1270,3 +1270,12 @@ def test_light_takes_as_long_as_the_beacon_has_to_go_where_the_links_have_unlike
     light_s = 3e7 / LIGHT_M_S
     travels = {stage.name: stage.duration_s for stage in found.wide.stages if stage.name.endswith("travels")}
     assert len(travels) == 4 and travels == pytest.approx(dict.fromkeys(travels, light_s), rel=1e-12)
+
+
+def test_a_scan_for_a_direction_without_error_is_refused_in_one_whole_sentence():
+    with pytest.raises(ValueError) as refused:
+        link_acquisition._pattern(None, 0.0, 1e-3)
+    assert str(refused.value) == (
+        "pointing.lines: every error is 0 rad, and a scan has nothing to cover; give an error above 0 rad, or take out "
+        "acquisition.scan"
+    )

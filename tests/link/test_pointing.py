@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import budgets
+from microrad import link
 from microrad.core.budget import Line, root_sum_square, total_db
 from microrad.link.pointing.error_classes import ErrorTerm, StatedError, error_term
+from microrad.link.pointing.open_loop import open_loop_budget
 from microrad.link.pointing.summation import radial_total_rad
 from microrad.mission.file import load_mission
 from microrad.mission.model import LinkMission
@@ -404,3 +407,18 @@ def test_a_root_sum_square_takes_one_linear_unit_and_names_those_that_it_got(uni
     assert root_sum_square(Line("x", value, "A", "", "", "") for value in (2.0, -3.0, 6.0)) == pytest.approx(
         7.0, rel=1e-12
     )
+
+
+@pytest.mark.parametrize("key", ["point_ahead", "point-ahead", "Point-Ahead"])
+def test_a_line_for_the_point_ahead_beside_its_table_is_refused_by_its_key(key):
+    line = next(iter(MISSION.pointing.lines.values()))
+    table = MISSION.pointing.model_copy(update={"lines": {"bench": line, key: line}})
+    shared = link.Shared.of(MISSION)
+    with pytest.raises(ValueError) as refused:
+        open_loop_budget(table, shared, None, {})
+    assert str(refused.value) == (
+        f"pointing.lines.{key} stands beside the table point_ahead, which is a line of the budget already; remove one "
+        "of the two"
+    )
+    alone = open_loop_budget(table, replace(shared, point_ahead=None), None, {})
+    assert [each.name for each in alone.stated] == ["Bench", "Point ahead"]
