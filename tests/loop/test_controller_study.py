@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from dataclasses import fields, replace
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad import mirror
-from microrad.loop import control, controller_study
+from microrad.loop import control, controller_study, disturbance
 from microrad.loop.controller_study import designs, parts, promises, results, scenario
 from microrad.loop.disturbance import NO_REFERENCE, Misalignment, Reference
 from microrad.loop.pointing_loop import ensemble, traces
@@ -1016,3 +1017,123 @@ def test_a_loop_of_both_axes_turns_its_mirrors_axes_as_the_geometry_says(file):
     turned = replace(file, mission=file.mission.model_copy(update={"fine_pointing": quarter}))
     np.testing.assert_allclose(scene_of(file).loop.optics, np.eye(2), atol=1e-12)
     np.testing.assert_allclose(scene_of(turned).loop.optics, [[0.0, -1.0], [1.0, 0.0]], atol=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------ from step to step
+def test_each_design_is_verified_on_each_mirror_and_its_spectrum_is_taken_on_the_missions_own(scene, monkeypatch):
+    asked, said = [], []
+
+    def simulate_cases(given, span, runs, told):
+        asked.append((span, runs))
+        told(5, 6)
+        return [(case.loop, case.controller, case.spectrum) for case in given]
+
+    monkeypatch.setattr(ensemble, "simulate_cases", simulate_cases)
+    monkeypatch.setattr(results, "for_mirror", lambda controller, loop: controller)
+    monkeypatch.setattr(results, "_verified", lambda where, design, runs: (design.name, runs))
+    variants = (Variant.GIVEN, Variant.COMPARISON, Variant.STRAIGHT)
+    here = SimpleNamespace(has=variants, on=lambda variant: f"loop {variant}", table=scene.table)
+    made = [SimpleNamespace(name=name, controller=f"that of {name}") for name in "AB"]
+    found = results.verify(here, made, lambda *each: said.append(each))
+    assert found == tuple(
+        (name, {v: (f"loop {v}", f"that of {name}", v == Variant.GIVEN) for v in variants}) for name in "AB"
+    )
+    assert asked == [(results.span(scene.table), scene.table.runs)]
+    assert said == [(5, 6, "simulating controllers")]
+
+
+def test_a_study_is_of_the_best_design_before_what_shakes_an_axis_and_tells_of_each_step(scene, monkeypatch):
+    said, x, y = [], (disturbance.olympus(), disturbance.body_pointing(3e-6, 3.0, 5.0)), (disturbance.olympus(),)
+    loop = SimpleNamespace(timing=control.Timing(1e-3, 5, 0), disturbances=(x, y))
+    here = SimpleNamespace(loop=loop, table=SimpleNamespace(quantile=0.75))
+    made = [SimpleNamespace(spectrum_rad2_hz=np.zeros((5, 2)), name=name) for name in "ABC"]
+
+    def step(name, found):
+        return lambda *given: given[-1](1, 2, name) or (found or (name, *given[:-1]))
+
+    monkeypatch.setattr(controller_study, "verify", step("verify", tuple(made)))
+    monkeypatch.setattr(controller_study, "best", lambda verified: verified[1])
+    monkeypatch.setattr(controller_study, "error_budget", step("budget", None))
+    monkeypatch.setattr(controller_study, "sines", step("sines", None))
+    found = controller_study.simulated(here, ("a", "b", "c"), 7e-6, lambda *each: said.append(each))
+    assert (found.scene, found.verified, found.best) == (here, tuple(made), made[1])
+    assert (found.budget, found.sines) == (("budget", here, made[1]), ("sines", here, ("a", "b", "c")))
+    assert (found.quantile, found.optimum_rad) == (0.75, 7e-6)
+    assert said == [(1, 2, "verify"), (1, 2, "budget"), (1, 2, "sines")]
+    assert found.freq_hz.tolist() == [0.0, 125.0, 250.0, 375.0, 500.0]
+    assert_allclose(found.disturbed_rad2_hz, sum(disturbance.psd(each, found.freq_hz) for each in x), rtol=1e-12)
+
+
+def test_a_whole_study_has_the_optimum_of_all_axes_and_one_of_a_name_that_design_alone(monkeypatch):
+    said, asked = [], []
+
+    def plain_designs(scene, on_progress=None, only=()):
+        asked.append((on_progress, only))
+        return ("one design",)
+
+    here = SimpleNamespace(loop=SimpleNamespace(axes=9), axis="its axis")
+    monkeypatch.setattr(controller_study, "plain_designs", plain_designs)
+    monkeypatch.setattr(controller_study, "optimum_rms_rad", lambda axis: {"its axis": 2e-6}[axis])
+    monkeypatch.setattr(controller_study, "simulated", lambda *given: given)
+    monkeypatch.setattr(controller_study, "verify", lambda *given: (given,))
+    found = controller_study.design_and_simulate(here, said.append)
+    assert found == (here, ("one design",), pytest.approx(6e-6), said.append)
+    assert controller_study.design_and_simulate_one(here, "LQG") == (here, ("one design",))
+    assert asked == [(said.append, ()), (None, ("LQG",))]
+
+
+def test_designs_stand_as_they_were_asked_for_and_are_told_by_the_first_of_those_that_are_tuned_in_turn(
+    scene, monkeypatch
+):
+    @contextmanager
+    def shared_out(jobs, told):
+        for turn in range(len(jobs)):
+            told(turn)
+        yield lambda: [job() for job in jobs]
+
+    def tuning(name, table, of):
+        assert (table, of) == (scene.table, ("plant",))
+        return lambda base=None: SimpleNamespace(controller=f"axis of {name}")
+
+    said = []
+    monkeypatch.setattr(designs, "shared_out", shared_out)
+    monkeypatch.setattr(designs, "_tuning", tuning)
+    monkeypatch.setattr(designs, "plants", lambda where, seed: {scene.table.seed: ("plant",)}[seed])
+    monkeypatch.setattr(designs, "build", lambda name, where, controller: (name, controller))
+    wanted = ("disturbance observer", "PI + inverse in series", "PI", "PI + inverse", "LQG")
+    found = designs.design(scene, lambda *each: said.append(each), wanted)
+    assert [d.controller for d in found] == [
+        (name, f"axis of {'PI' if name == 'PI + inverse' else name}") for name in wanted
+    ]
+    assert [(d.name, d.inverse, d.margin) for d in found] == [
+        ("disturbance observer", "", None), ("PI + inverse in series", "in series", None), ("PI", "", None),
+        ("PI + inverse", "of the reference", None), ("LQG", "", None),
+    ]  # fmt: skip
+    assert said == [
+        (0, 5, "tuning LQG"), (1, 5, "tuning PI"), (3, 5, "tuning disturbance observer"),
+        (4, 5, "tuning PI + inverse in series"), (5, 5, "controllers tuned"),
+    ]  # fmt: skip
+
+
+def test_a_design_that_no_larger_margin_mends_stays_with_its_broken_promise(monkeypatch):
+    asked, said = [], []
+    made = [SimpleNamespace(name=name) for name in ("LQG", "PI")]
+    figures = [SimpleNamespace(holds=False, of="LQG"), SimpleNamespace(holds=False, of="PI")]
+    again = SimpleNamespace(name="PI", margin=0.6), SimpleNamespace(holds=True)
+
+    def design(scene, on_progress, only):
+        asked.append(("design", on_progress, only))
+        return made
+
+    def firmer(scene, broken, on_progress):
+        asked.append((broken.name, on_progress))
+        return None if broken.name == "LQG" else again
+
+    monkeypatch.setattr(promises.designs, "design", design)
+    monkeypatch.setattr(promises.results, "outlook", lambda scene, found, on_progress: figures)
+    monkeypatch.setattr(promises, "_firmer", firmer)
+    tell = said.append
+    assert promises.design_and_promise(None, tell, ("LQG", "PI")) == ((made[0], figures[0]), again)
+    assert asked == [("design", tell, ("LQG", "PI")), ("LQG", tell), ("PI", tell)]
+    assert promises.design(None, tell, ("LQG", "PI")) == (made[0], again[0])
+    assert asked[3] == asked[0]

@@ -1704,3 +1704,32 @@ def test_lines_beside_a_filter_become_bands_of_a_thousandth_behind_its_states(li
         assert_allclose(np.linalg.eigvals(found.A[here, here]), 2 * pi * freq * np.array([-1e-3 + 1j, -1e-3 - 1j]))
         alone = replace(found, A=found.A[here, here], B=found.B[here], C=found.C[:, here])
         assert alone.variance_rad2 == pytest.approx(0.5 * amplitude**2, rel=1e-9)
+
+
+def test_loops_of_one_disturbance_but_another_clock_or_mirror_are_the_runs_that_each_would_be_alone():
+    """Two and four steps of the same length a sample, four shorter ones, and a third output behind the same axes."""
+    base = scenario(2, static_mirror(), drive=Drive(-inf, inf, inf, inf, 0.0, 0.0))
+    three = mirror.combine(*[static_mirror()] * 3)
+    loops = [replace(base, timing=Timing(*each)) for each in ((2e-4, 4, 0), (1e-4, 2, 0), (1e-4, 4, 0))]
+    loops.append(replace(loops[0], mirror=three, optics=np.array([[1.0, 0.0, 0.5], [0.0, 1.0, -0.5]])))
+    assert all(loop.disturbances is base.disturbances for loop in loops)
+    cases, span, told = [ensemble.Case(loop, pi_for(loop, 100.0)) for loop in loops], Span(0.02, 0.005, 7), []
+    together = ensemble.simulate_cases(cases, span, 3, lambda *each: told.append(each))
+    assert told[-1] == (4, 4)
+    for case, found in zip(cases, together, strict=True):
+        alone = ensemble.simulate(case.loop, case.controller, span, 3)
+        for field in FIELDS:
+            assert_array_equal(getattr(found, field), getattr(alone, field))
+    assert [each.steps for each in together] == [300, 300, 600, 300]
+    with pytest.raises(ValueError, match="an ensemble of 0 runs has no statistics: ask for 1 run or more"):
+        ensemble.simulate_cases(cases, span, 0)
+
+
+def test_a_pole_on_the_unit_circle_itself_is_unstable():
+    """An integrator that nothing reads or drives."""
+    loop = fast(2e-4)
+    still = lti.StateSpace(np.eye(1), np.zeros((1, 2)), np.zeros((1, 1)), np.zeros((1, 2)))
+    closed = close_axis(loop, AxisController("held", still, np.zeros((1, 1))))
+    assert closed.worst_pole() == (1.0, 0.0)
+    with pytest.raises(ValueError, match=r"the loop under 'held' is unstable: a pole at \|z\| = 1\.000000 \(the limit"):
+        linear.stationary(closed)
