@@ -17,6 +17,7 @@ from microrad.loop.control import adaptive
 from microrad.loop.controller_study import designs
 from microrad.loop.pointing_loop import ensemble, kernel_arrays
 from microrad.loop.pointing_loop import loop as fine
+from microrad.mirror import model
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 from microrad.mission.file import load_mission
 from microrad.mission.tables.mirror import PrandtlIshlinskiiTable
@@ -262,3 +263,30 @@ def test_each_actuator_expects_its_own_reading(monkeypatch):
     monkeypatch.setattr(fine, "expected_reading", expected)
     order = frozen.system.order
     assert_allclose(fine.with_adaptation(frozen, nominal).system.A[order:, order:], np.diag([0.1, 0.2]))
+
+
+@pytest.mark.parametrize(("delays", "samples"), [((7.2, 3.0), 7), ((3.0, 7.6), 8), ((0.0, 0.0), 1), ((0.0, 1.4), 1)])
+def test_what_is_learnt_is_as_late_as_the_latest_reading_and_a_sample_at_least(monkeypatch, delays, samples):
+    def expected(loop, actuator):
+        """A lag of gain 1 that is so many samples late, or none."""
+        late, one = delays[actuator], np.ones((1, 1))
+        fed = one / late if late else 0.0 * one
+        return lti.StateSpace(np.sign(late) * one - fed, fed, one, one - np.sign(late))
+
+    nominal = loop_of(axes=2)
+    monkeypatch.setattr(fine, "expected_reading", expected)
+    assert fine.with_adaptation(in_series(nominal), nominal).adaptation.delay_samples == samples
+
+
+def test_each_actuators_reading_is_expected_to_reach_its_own_target():
+    """Of two actuators of unlike plays and resonances: a target of 1 rad becomes a reading of 1 rad."""
+    soft = replace(PLAYS, weights_rad_v=tuple(0.25 * w for w in PLAYS.weights_rad_v))
+    alone = [loop_of(), loop_of(soft, system=resonance(300.0, 0.1))]
+    both = replace(loop_of(axes=2), mirror=model.combine(*(loop.mirror for loop in alone)))
+    freq = np.array([1e-3, 100.0, 300.0])
+    for actuator, loop in enumerate(alone):
+        found = lti.frequency_response(fine.expected_reading(both, actuator), freq, 2e-4)[:, 0, 0]
+        own = lti.frequency_response(fine.expected_reading(loop, 0), freq, 2e-4)[:, 0, 0]
+        assert found[0] == pytest.approx(1.0, abs=1e-4)
+        assert_allclose(found, own, atol=2.0 * fine.EXPECTED_WITHIN)
+    assert abs(own[2]) > 3.0

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from learning_loops import loop_of
 from microrad import mirror
 from microrad.loop import control, controller_study, disturbance
 from microrad.loop.controller_study import designs, parts, promises, results, scenario
@@ -1137,3 +1138,44 @@ def test_a_design_that_no_larger_margin_mends_stays_with_its_broken_promise(monk
     assert asked == [("design", tell, ("LQG", "PI")), ("LQG", tell), ("PI", tell)]
     assert promises.design(None, tell, ("LQG", "PI")) == (made[0], again[0])
     assert asked[3] == asked[0]
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_design_is_held_against_the_loop_that_theory_is_of_and_its_spectrum_between_the_ends(monkeypatch, every):
+    """A prediction by frequency is there where the sensor reads each sample."""
+    monkeypatch.setattr(results, "close", lambda loop, controller: (loop, controller))
+    monkeypatch.setattr(results, "stationary", lambda closed: ("theory", closed))
+    monkeypatch.setattr(results, "residual_spectrum", lambda closed, freq: np.outer(freq, [2.0, 3.0]))
+    monkeypatch.setattr(results, "residual", lambda run, quantile: (run.name, quantile))
+    loop = SimpleNamespace(axes=2, optical=SimpleNamespace(every=every))
+    here = SimpleNamespace(theory="straight", loop=loop, table=SimpleNamespace(quantile=0.75))
+    freq = np.array([0.0, 10.0, 20.0, 30.0])
+    runs = {
+        variant: SimpleNamespace(name=f"on {variant}", freq_hz=freq * k, psd_rad2_hz=f"spectrum {variant}")
+        for k, variant in enumerate((Variant.STRAIGHT, Variant.GIVEN))
+    }
+    design = SimpleNamespace(name="LQG", controller="its controller")
+    found = results._verified(here, design, runs)
+    assert (found.design, found.theory) == (design, ("theory", ("straight", "its controller")))
+    assert found.simulated == {variant: (f"on {variant}", 0.75) for variant in runs}
+    assert found.spectrum_rad2_hz == f"spectrum {Variant.GIVEN}"
+    inside = [[20.0, 30.0], [40.0, 60.0]] if every == 1 else [[math.nan] * 2] * 2
+    np.testing.assert_array_equal(found.predicted_rad2_hz, [[math.nan] * 2, *inside, [math.nan] * 2])
+
+
+def test_sources_are_those_of_either_axis_each_named_once_where_it_first_stands(scene):
+    a, b, c = (replace(disturbance.olympus(), name=name) for name in ("a", "b", "c"))
+    for axes, names in ((((b, a), (c, a)), ("b", "a", "c")), (((), (c, b)), ("c", "b"))):
+        loop = replace(scene.loop, disturbances=axes, gauge=None, unknown=())
+        assert parts.sources(loop) == (*names, "optical sensor noise", "reference")
+
+
+def test_an_adaptive_inverse_learns_and_the_same_inverse_without_that_name_does_not(scene):
+    learning = loop_of(axes=2)
+    here = replace(scene, loop=learning, axis=loop_of())
+    axis = control.PI.build(design_plant(scene.axis), np.array([60.0, 1500.0]))
+    made, frozen = (designs.build(name, here, axis) for name in (designs.ADAPTIVE, designs.IN_SERIES))
+    assert (made.name, len(made.adaptation.plays), frozen.adaptation) == (designs.ADAPTIVE, 2, None)
+    assert [len(each.system.C) for each in (made, frozen)] == [8, 6]
+    design = designs.Design(designs.ADAPTIVE, SimpleNamespace(controller=axis), made, "in series")
+    assert len(designs.on_one_axis(design, here).adaptation.plays) == 1

@@ -33,6 +33,8 @@ from microrad.mission.file import load_coupled_mirror
 from several_axes import TEXT, mission, mission_text, scene_of, three_actuators, two_axes
 from shipped import DEFAULT
 
+coupled_scene = sys.modules[line_of_sight.__module__]  # `coupled_study.scene` is the function
+
 
 @cache
 def plate():
@@ -892,3 +894,94 @@ def test_a_mirror_without_hysteresis_has_one_plant_for_all_motions():
     assert (len(with_plays.linear), len(plain.linear)) == (2, 1)
     found, freq = plain.linear[0].mirror, np.array([1.0, 30.0, 150.0])
     assert_allclose(found.frequency_response(freq), replace(m, **none).frequency_response(freq), rtol=1e-12)
+
+
+MISALIGNED = """[fine_pointing.misalignment]
+offset = ["20 urad", "-5 urad"]
+drift = ["3 urad/s", "7 urad/s"]
+
+[fine_pointing.body]"""
+
+
+@pytest.mark.parametrize(
+    ("limits", "slew", "drive", "identified"),
+    [
+        ([(50.0, 5.0, 85.0, 3e4), (45.0, 0.0, 100.0, 1e5), (55.0, 15.0, 100.0, 2e4)], 2e4, (-45.0, 45.0), (-40.0, 35.0)),
+        ([(50.0, 0.0, 99.0, 2e4), (62.0, 0.0, 120.0, 1e4), (60.0, 1.0, 130.0, 9e4)], 1e4, (-50.0, 38.0), (-50.0, 49.0)),
+    ],
+)  # fmt: skip
+def test_a_loop_of_several_axes_is_driven_as_its_narrowest_actuators_allow(
+    monkeypatch, limits, slew, drive, identified
+):
+    """Of an amplifier of 0 to 100 V at each actuator; the stroke is that of the nearer end, either way."""
+    asked, plain = [], three_actuators()
+    of = tuple(
+        replace(actuator, bias_v=bias, drive_min_v=low, drive_max_v=high, rate_limit_v_s=rate)
+        for actuator, (bias, low, high, rate) in zip(plain.actuators, limits, strict=True)
+    )
+    monkeypatch.setattr(coupled, "draws", lambda *given: asked.append(given) or ())
+    mirror, changes = replace(plain, actuators=of), (("[fine_pointing.body]", MISALIGNED), ("seed = 1", "seed = 29"))
+    scene = scene_of(mirror, *changes)
+    loop = scene.loop
+    assert (loop.drive.minimum_v, loop.drive.maximum_v) == pytest.approx(drive)
+    assert (loop.drive.slew_v_s, loop.drive_range_v) == (slew, identified)
+    assert asked == [(mirror, 8, 29)]
+    assert scene.table.seed == 29
+    (x, x_rate), (y, y_rate) = ((each.offset_rad, each.rate_rad_s) for each in loop.unknown)
+    assert (x, x_rate, y, y_rate) == pytest.approx((20e-6, 3e-6, -5e-6, 7e-6))
+    assert all(each.unknown == loop.unknown and each.gauge is None for each in (loop, *scene.linear))
+    reach = min(-drive[0], -identified[0]), min(drive[1], identified[1])
+    assert scene.reach_v == pytest.approx((-reach[0], reach[1]))
+    assert [b.name for b in scene.stroke] == ["actuator 1", "actuator 2", "actuator 3"]
+    for budget in (*scene.stroke, *scene.stroke_without_point_ahead):
+        assert budget.usable_travel_rad == pytest.approx(2.0 * nominal_axis_gain(scene.rest) * min(reach), rel=1e-9)
+
+
+@pytest.mark.parametrize("several", [None, "mirror of several axes"])
+def test_a_missions_loop_is_that_of_its_mirror_with_its_light_and_the_angle_at_which_that_arrives(monkeypatch, several):
+    monkeypatch.setattr(coupled_scene, "mirror_of_loop", lambda file: several)
+    monkeypatch.setattr(coupled_scene.scenario, "scene", lambda *given: ("one axis", *given))
+    monkeypatch.setattr(coupled_scene, "scene", lambda *given: ("several", *given))
+    monkeypatch.setattr(coupled, "of", lambda given: f"linear {given}")
+    found = coupled_study.of_mission("file", "parts", 2e-9, "arrival")
+    kind, mirror = ("several", f"linear {several}") if several else ("one axis", "parts")
+    assert found == (kind, "file", mirror, 2e-9, "arrival")
+
+
+def test_a_broken_design_of_several_axes_keeps_its_place_and_what_was_refused_is_kept(monkeypatch):
+    broken, kept, mended = (SimpleNamespace(name=name) for name in ("LQG", "PI", "PI + notch"))
+    figures = [SimpleNamespace(holds=holds) for holds in (False, True, False)]
+    again, asked = (SimpleNamespace(name="PI + notch", margin=0.7), SimpleNamespace(holds=True)), []
+
+    def firmer(scene, design, tell):
+        asked.append((design.name, tell))
+        return again if design is mended else None
+
+    found = designs.CoupledDesigns((broken, kept, mended), {"H-infinity": "out of reach"})
+    monkeypatch.setattr(designs, "design", lambda scene, tell, only: asked.append((only, tell)) or found)
+    monkeypatch.setattr(designs, "outlook", lambda scene, made, tell: asked.append((len(made), tell)) or figures)
+    monkeypatch.setattr(designs, "_firmer", firmer)
+    made, told = designs.design_and_promise("scene", print, ("LQG", "PI"))
+    assert made == designs.CoupledDesigns((broken, kept, again[0]), {"H-infinity": "out of reach"})
+    assert told == (figures[0], figures[1], again[1])
+    assert asked == [(("LQG", "PI"), print), (3, print), ("LQG", print), ("PI + notch", print)]
+
+
+def test_families_in_turn_begin_with_the_one_that_others_contain_and_a_refused_one_is_no_base(monkeypatch):
+    pi, notch, peaks = (SimpleNamespace(name=name, base=None) for name in ("PI", "PI + notch", "PI + peaks"))
+    notch.base = peaks.base = pi
+    made, asked = designs.CoupledDesign("PI", {}, None, None, None, None), []
+
+    def designed(scene, family, of, base):
+        asked.append((family.name, of, base))
+        if family is notch or (family is pi and of == "narrow"):
+            raise ValueError(f"{family.name} is out of reach")
+        return made
+
+    monkeypatch.setattr(designs, "_designed", designed)
+    found = designs._designed_in_turn("scene", [notch, peaks, pi], "wide")
+    assert asked == [("PI", "wide", None), ("PI + notch", "wide", made), ("PI + peaks", "wide", made)]
+    assert found == {"PI": made, "PI + notch": "PI + notch is out of reach", "PI + peaks": made}
+    asked.clear()
+    assert designs._designed_in_turn("scene", [peaks, pi], "narrow")["PI"] == "PI is out of reach"
+    assert asked == [("PI", "narrow", None), ("PI + peaks", "narrow", None)]
