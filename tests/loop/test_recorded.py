@@ -767,3 +767,27 @@ def test_a_power_beyond_a_frequency_is_the_sum_of_the_bins_above_it():
     assert recorded.beyond_rms(motion, 38.5) == pytest.approx(math.sqrt(0.5), rel=2e-3)
     assert recorded.beyond_rms(motion, 40.0) == pytest.approx(math.sqrt(0.5 / 6), rel=2e-2)
     assert recorded.beyond_rms(motion, 42.0) < 1e-2
+
+
+def test_what_is_kept_of_a_recording_of_another_rate_begins_behind_its_edge_and_each_line_of_the_plant_counts(
+    small, monkeypatch
+):
+    """Lines above half of the control rate and below half of the plant's; one beyond that is in no theory of it."""
+    parts, controller = LOOP.parts, LOOP.assembled(TRACKING)
+    motion = recorded_motion(small.motion.samples_rad[:1000], small.motion.step_s)
+    monkeypatch.setattr(played, "_simulated", lambda *_: 0.0)
+    monkeypatch.setattr(played, "_reason", lambda *_: "")
+    edge, fast = edge_s(motion, STEP), SpectralLine(4e-6, 1500.0)
+    assert 0.1 < edge < 0.3
+    shaken = replace(small.disturbance, lines=(SpectralLine(9e-6, 20_000.0), fast))
+    with_it, plain = (
+        recorded_residual(parts, controller, replace(small, motion=motion, disturbance=each), settle_s)
+        for each, settle_s in ((shaken, 0.1), (replace(shaken, lines=()), 0.3))
+    )
+    assert with_it.played.begin_s == pytest.approx(edge, abs=STEP)
+    assert plain.played.begin_s == pytest.approx(0.3, abs=1e-9)
+    assert [each.played.end_s for each in (with_it, plain)] == pytest.approx([motion.duration_s - edge] * 2, abs=STEP)
+    line = replace(shaken, A=np.zeros((0, 0)), B=np.zeros((0, 1)), C=np.zeros((1, 0)), lines=(fast,))
+    alone = stationary(close(replace(parts, disturbances=((line,),)), controller)).error_by_source[line.name][0]
+    assert with_it.fitted_rms_rad**2 - plain.fitted_rms_rad**2 == pytest.approx(alone, rel=1e-6)
+    assert alone > 0.1 * plain.fitted_rms_rad**2
