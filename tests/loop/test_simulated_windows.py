@@ -13,7 +13,14 @@ from microrad.loop.disturbance import Disturbance, SpectralLine, first_order
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.loop.pointing_loop.linear import close, residual_spectrum
-from microrad.loop.pointing_loop.simulated_windows import Windows, ask, half_width, simulated_windows, windows_asked
+from microrad.loop.pointing_loop.simulated_windows import (
+    Question,
+    Windows,
+    ask,
+    half_width,
+    simulated_windows,
+    windows_asked,
+)
 from microrad.loop.pointing_loop.traces import trace
 from microrad.loop.pointing_loop.windows import windowed, windowed_in_all
 from microrad.loop.workbench import Controller, Loop
@@ -236,3 +243,75 @@ def test_several_questions_are_asked_of_the_same_runs_at_once():
     apart = simulated(BENT, INDICES[:2]), simulated(BENT, INDICES[2:3])
     for left, right in zip(together, apart, strict=True):
         assert [each.rms_rad for each in left] == [each.rms_rad for each in right]
+
+
+class Last:
+    """The error of each axis at the last control sample that it has heard of, which it numbers."""
+
+    def __init__(self, number):
+        self.number, self.heard = number, 0
+
+    def add(self, at, error):
+        assert at == self.heard
+        self.heard, self.last = at + len(error), error[-1]
+
+    @property
+    def mean(self):
+        return np.vstack([self.last, np.full(self.last.shape[1], self.number)])
+
+
+def test_questions_at_once_hear_their_own_tallies_and_that_of_a_second_terminal_the_runs_behind_all_of_the_first():
+    """65 runs take two batches of 64: the second terminal's are those from number 128 on."""
+    parts, controller, span, told = PLAIN.parts, PLAIN.assembled(TRACKING), Span(0.05, 0.01, 3), []
+    asked = [
+        Question(lambda: [Last(1), Last(2)], lambda found: ("two", found)),
+        Question(lambda: [Last(3)], lambda found: ("twin", found), twin=True),
+        Question(lambda: [Last(4)], lambda found: ("one", found)),
+    ]
+    answers = ask(asked, parts, controller, span, 65, threads=1, on_progress=lambda *each: told.append(each))
+    assert [name for name, _ in answers] == ["two", "twin", "one"]
+    (a, b), (twin,), (one,) = (found for _, found in answers)
+    assert [each[:, -1].tolist() for each in (a, b, twin, one)] == [[number] * 65 for number in (1, 2, 3, 4)]
+    assert [each.shape for each in (a, b, twin, one)] == [(65, 2), (65, 2), (65, 3), (65, 2)]
+    for run in (0, 63, 64):
+        own, other = (trace(parts, controller, span, number).error_rad[-1, 0] for number in (run, 128 + run))
+        assert [each[run, 0] for each in (a, b, twin, one)] == [own] * 4
+        assert twin[run, 1] == other != own
+    assert told == [(64, 65, "simulating windows"), (65, 65, "simulating windows")]
+
+
+def test_runs_are_held_against_the_theory_of_the_loop_that_is_given_for_it():
+    parts, controller, span = BENT.parts, BENT.assembled(TRACKING), Span(0.3, 0.1, 1)
+    stiff = replace(parts, mirror=Mirror.of(80e-6, [1.0], LIGHT))
+    own, other = (
+        ask([windows_asked(parts, controller, INDICES[:2], span, theory)], parts, controller, span, 2)[0]
+        for theory in (None, stiff)
+    )
+    assert [each.rms_rad for each in own] == [each.rms_rad for each in other]
+    for each, theory in ((own, parts), (other, stiff)):
+        closed = close(theory, controller)
+        expected = [math.sqrt(float(np.sum(windowed_in_all(closed, i, at_samples=True)))) for i in INDICES[:2]]
+        assert [e.linear_rad for e in each] == pytest.approx(expected, rel=1e-12)
+    assert other[0].linear_rad < 0.99 * own[0].linear_rad
+
+
+@pytest.mark.parametrize("index", [ErrorIndex("PDE", 0.001, 0.004), ErrorIndex("RPE", 0.0012), ErrorIndex("MPE", 6e-4)])
+def test_a_window_of_one_control_sample_is_refused_with_and_without_a_spacing(index):
+    with pytest.raises(ValueError) as refused:
+        simulated(PLAIN, (INDICES[0], index))
+    assert str(refused.value) == (
+        f"{index.kind} over 1 ms looks at one control sample of a run: give a window of two or more"
+    )
+
+
+def test_a_window_may_fill_a_run_and_a_loop_in_which_nothing_moves_has_no_interval():
+    still = replace(PLAIN, vibration=(), sensor_noise_rad=0.0)
+    index, span = ErrorIndex("RPE", 0.04), Span(0.05, 0.01, 1)
+    (found,) = simulated(PLAIN, (index,), span, 2)
+    squares = [of_all_samples(trace(PLAIN.parts, PLAIN.assembled(TRACKING), span, run).error_rad[10:, 0], index)
+               for run in (0, 1)]  # fmt: skip
+    assert found.rms_rad == pytest.approx(math.sqrt(np.mean(squares)), rel=1e-9)
+    (nothing,) = simulated(still, (index,), span, 2)
+    assert (nothing.rms_rad, nothing.interval_rad, nothing.linear_rad) == (0.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="PDE looks at 41 ms of a run, and 40 ms are left behind its settling"):
+        simulated(PLAIN, (ErrorIndex("PDE", 0.011, 0.03),), span, 2)
