@@ -211,3 +211,10 @@ def test_lines_and_noises_of_one_name_add_up():
     alone = left(one)["wheel"], left(other)["wheel"], left(SLOW)["vibration"]
     assert left(of_two)["wheel"] == pytest.approx(alone[0] + alone[1], rel=1e-12)
     assert left(one, replace(SLOW, name="wheel"))["wheel"] == pytest.approx(alone[0] + alone[2], rel=1e-12)
+
+
+def test_reproducibility_of_a_mean_is_told_before_and_behind_the_loop_without_a_rational_form():
+    (found,) = windows.windowed_errors(closed(), (ErrorIndex("PRE", 0.005, 0.5),))
+    assert math.isnan(found.rational)
+    assert found.before["wheel"] == pytest.approx(windowed_rms(LINES, found.index), rel=1e-9)
+    assert found.left.keys() == {"vibration", "wheel", "optical sensor noise", "gauge noise"}

@@ -1733,3 +1733,39 @@ def test_a_pole_on_the_unit_circle_itself_is_unstable():
     assert closed.worst_pole() == (1.0, 0.0)
     with pytest.raises(ValueError, match=r"the loop under 'held' is unstable: a pole at \|z\| = 1\.000000 \(the limit"):
         linear.stationary(closed)
+
+
+def three_behind_two():
+    """Three actuators, each with an output of its own, turn the line of sight about two axes."""
+    each = [static_mirror(1e-4), static_mirror(2e-4), static_mirror(3e-4)]
+    optics = np.array([[1.0, 0.25, 0.5], [-0.5, 0.75, 2.0]])
+    loop = scenario(
+        2, static_mirror(), mirror=mirror.combine(*each), optics=optics, timing=Timing(2e-4, 3, 4),
+        references=(Reference(7 * URAD, URAD, 1.0), Reference(-3 * URAD, 0.0, 2.0)),
+        unknown=(Misalignment(3 * URAD, 0.0), Misalignment(-2 * URAD, 0.0)),
+    )  # fmt: skip
+    return loop, pi_for(loop, 60.0)
+
+
+def test_records_of_a_run_keep_axes_actuators_and_outputs_apart_where_their_numbers_differ():
+    loop, controller = three_behind_two()
+    span = Span(0.02, 0.0, 9)
+    found, again = traces.trace(loop, controller, span, 3), traces.replay(loop, controller, 100, 9, 3)
+    shapes = [getattr(found, name).shape for name in ("error_rad", "measured_rad", "drive_v", "mirror_rad")]
+    assert shapes == [(100, 2), (100, 2), (100, 3), (100, 3)]
+    gains = np.array([1e-4, 2e-4, 3e-4])
+    assert_allclose(found.mirror_rad, gains * found.drive_v, rtol=1e-6, atol=1e-12)
+    line_of_sight = found.mirror_rad @ loop.optics.T
+    assert_allclose(found.error_rad, found.reference_rad + found.disturbance_rad - line_of_sight, rtol=0, atol=1e-11)
+    assert_allclose(found.reference_rad[0], [7 * URAD, -3 * URAD], rtol=1e-12)
+    assert_array_equal(again.error_rad, found.error_rad)
+    assert (again.inputs.shape, again.commands.shape) == ((100, 2 + 3 + 2), (100, 3))
+    assert_allclose(again.inputs[:, :2], found.measured_rad, rtol=1e-12)
+    assert_allclose(again.inputs[:, 5:], found.reference_rad, rtol=1e-12)
+    own = [(Reference(k * URAD, 0.0, 1.0), Reference(0.0, k * URAD, 1.0)) for k in (5, 2)]
+    errors, turned = traces.side_by_side(loop, controller, span, own, first_run=4)
+    assert (errors.shape, turned.shape) == ((2, 100, 2), (2, 100, 3))
+    for k, references in enumerate(own):
+        alone = traces.trace(replace(loop, references=references), controller, span, 4 + k)
+        assert_array_equal(errors[k], alone.error_rad)
+        assert_array_equal(turned[k], alone.mirror_rad)

@@ -484,3 +484,56 @@ def test_an_offset_is_a_quarter_of_what_the_drives_reach_or_the_sensor_sees_with
         0,
     )
     assert (found.drive.maximum_v, found.optical.field_of_view_rad) == (limits[1], field)
+
+
+def test_each_index_has_its_own_worst_mirror_and_the_weakest_is_another_one(monkeypatch):
+    """Corners of two sigma: the first index grows with both numbers, the second where the second number falls."""
+    monkeypatch.setattr(search, "close", lambda theory, controller: None)
+    monkeypatch.setattr(search, "refuse_unstable", lambda closed: None)
+    subject = known_subject([])
+    weak = subject.figures
+    subject.figures = lambda mirrors, indices, threads: replace(
+        weak(mirrors, indices, threads),
+        modulus=np.array([0.5 + 0.05 * m.mirror[0] + 0.02 * m.mirror[1] for m in mirrors]),
+    )
+    found = worst_case.worst_case(subject, 4, (APE, ErrorIndex("RPE", 0.1)), Extent(1, 2, 2.0))
+    both, second = found.largest_rad
+    assert (both.value, second.value) == (pytest.approx(6.2), pytest.approx(2.6))
+    assert both.sigmas == pytest.approx({"gain": 2.0, "pole": 2.8, "zero": 2.0})
+    assert second.sigmas == pytest.approx({"gain": 2.0, "pole": -0.4, "zero": -2.0})
+    assert found.smallest_modulus.value == pytest.approx(0.36)
+    assert found.smallest_modulus.sigmas == pytest.approx({"gain": -2.0, "pole": -2.8, "zero": -2.0})
+    assert found.verified_in_time == ("in time", (-2.0, -2.0), 0.9)
+    assert (found.corners, found.corners_left_out, found.unstable_corners, found.unstable_draws) == (4, 0, 0, 0)
+
+
+@pytest.mark.parametrize(("states", "draws", "directions"), [(16, 1000, 10), (17, 200, 7)])
+def test_without_an_extent_a_mirror_is_looked_at_as_its_states_allow(monkeypatch, states, draws, directions):
+    asked, subject = [], known_subject([])
+    monkeypatch.setattr(search, "close", lambda theory, controller: None)
+    monkeypatch.setattr(search, "refuse_unstable", lambda closed: None)
+    subject.theory = SimpleNamespace(mirror=SimpleNamespace(A=np.zeros((states, states))))
+    subject.figures, figures = lambda *given: asked.append(given[1:]) or figures(*given), subject.figures
+    found = worst_case.worst_case(subject, 4)
+    assert found.extent == Extent(draws, directions, 3.0)
+    assert asked == [((APE,), None)] * 3
+    assert found.indices == (APE,)
+
+
+def test_a_parameter_that_no_mirror_may_be_moved_by_has_no_sensitivity_and_those_that_may_one_way_theirs():
+    class Stiff(Known):
+        """No mirror has the second number beyond 0.9 either way, and none the first below 0.8 under 0."""
+
+        def moved(self, normals):
+            return None if abs(normals[1]) > 0.9 or normals[0] < -0.8 else super().moved(normals)
+
+    asked = []
+    subject = known_subject(asked)
+    subject.known = Stiff()
+    _, ranked = search._ranked(subject, subject.known.moved(np.zeros(2)), (APE, ErrorIndex("RPE", 0.1)), None)
+    assert [s.parameter for s in ranked] == ["pole", "gain", "zero"]
+    pole, gain, zero = ranked
+    assert (*pole.rms, pole.modulus) == pytest.approx((0.076, 0.12, 0.092))
+    assert (*gain.rms, gain.modulus) == pytest.approx((0.1, 0.0, 0.1))
+    assert (zero.rms, zero.modulus, zero.largest) == ((0.0, 0.0), 0.0, 0.0)
+    assert asked == [(4, ["APE", "RPE"], None)]
