@@ -290,3 +290,36 @@ def test_each_actuators_reading_is_expected_to_reach_its_own_target():
         assert found[0] == pytest.approx(1.0, abs=1e-4)
         assert_allclose(found, own, atol=2.0 * fine.EXPECTED_WITHIN)
     assert abs(own[2]) > 3.0
+
+
+def test_plays_of_no_weight_can_learn_and_of_several_models_each_has_to():
+    without = replace(PLAYS, weights_rad_v=(50e-6, 0.0, 10e-6, 0.0, 9e-6))
+    assert adaptive.cannot_learn(without) == ""
+    found = adaptive.adaptation((PLAYS, without), 3e-8, 4, 6.0)
+    assert (found.plays, found.noise_rad, found.delay_samples, found.swing_v) == ((PLAYS, without), 3e-8, 4, 6.0)
+    bent = BoucWen(89e-6, 0.0, -22e-6, 0.0, 2.4, 0.6)
+    wide = replace(PLAYS, widening_s=1e-3)
+    rising = replace(PLAYS, weights_rad_v=(50e-6, 10e-6, -1e-6, 10e-6, 9e-6))
+    for other, words in (
+        (bent, "is a Bouc-Wen model"),
+        (wide, "widen with the drive's rate"),
+        (rising, "-1e-06 rad/V"),
+    ):
+        for models in ((PLAYS, other), (other, PLAYS)):
+            with pytest.raises(ValueError, match=words):
+                adaptive.adaptation(models, 3e-8, 4, 6.0)
+
+
+def test_each_of_several_plays_has_thresholds_and_weights_of_its_own_number_and_all_one_cycle():
+    """Five and two plays, whose cycle is the longer one's: a sample more than delay and thresholds."""
+    few = PrandtlIshlinskii((0.0, 0.4), (20e-6, 5e-6))
+    of = adaptive.Adaptation((few, PLAYS), 3e-8, 40, 6.0)
+    found = adaptive.adaptive_arrays(of, 1e-3)
+    assert found["adaptive_start"].tolist() == [0, 2, 7]
+    assert found["adaptive_threshold"].tolist() == [*few.thresholds_v, *PLAYS.thresholds_v]
+    assert found["adaptive_weight"].tolist() == [*few.weights_rad_v, *PLAYS.weights_rad_v]
+    assert found["adaptive"][:, kernels.CYCLE].tolist() == [46.0, 46.0]
+    assert found["adaptive"][:, kernels.DELAY].tolist() == [40.0, 40.0]
+    assert_allclose(found["adaptive"][:, kernels.LEAST_WEIGHT], [10e-6, 25e-6], rtol=1e-12)
+    assert_allclose(found["adaptive"][:, kernels.MOST_WEIGHT], [2.0 * 25e-6, 2.0 * 89e-6], rtol=1e-12)
+    assert adaptive.cycle_samples(of, 1e-5) == 320

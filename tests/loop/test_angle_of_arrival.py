@@ -1,7 +1,9 @@
 """The angle at which light arrives out of turbulent air, as a disturbance of the loop of a station."""
 
 import math
+import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -224,3 +226,23 @@ def test_what_only_a_satellite_has_is_refused_beside_a_station(tmp_path, key, ta
         load_mission(tmp_path / "m.toml", text=text)
     assert [each.key for each in refused.value.faults] == [key]
     assert 'stands beside orbit.leo of kind "station", and means a satellite there' in str(refused.value)
+
+
+def test_the_fitted_angle_says_of_which_light_and_air_it_is_between_which_frequencies_and_from_where(monkeypatch):
+    asked = []
+
+    def fit_table(*columns, **said):
+        asked.append((columns, said))
+        return SimpleNamespace(
+            disturbance=replace(disturbance.olympus(), name=said["name"], source=said["source"], basis="as fitted")
+        )
+
+    monkeypatch.setattr(sys.modules[disturbance.angle_of_arrival.__module__], "fit_table", fit_table)
+    given = disturbance.Arrival((0.2, 7.0, 2e3), (3e-12, 2e-12, 1e-15), 1e-6, "a light at 20 degrees", "a page")
+    found = disturbance.angle_of_arrival(given)
+    assert (found.name, found.source) == ("angle of arrival", "a page")
+    assert found.basis == "a light at 20 degrees; from 200 mHz to 2 kHz; as fitted"
+    said = {"convention": "per-axis", "name": "angle of arrival", "source": "a page"}
+    assert asked == [(((0.2, 7.0, 2e3), (3e-12, 2e-12, 1e-15)), said)]
+    other = disturbance.angle_of_arrival(replace(given, basis="another light", source="another page"))
+    assert (other.source, other.basis) == ("another page", "another light; from 200 mHz to 2 kHz; as fitted")

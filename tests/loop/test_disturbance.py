@@ -1482,3 +1482,26 @@ def test_a_table_is_fitted_from_a_third_of_its_first_to_twice_its_last_frequency
         assert found == [pytest.approx(0.5 / 3), pytest.approx(100.0), pytest.approx(damping), 0.1]
     assert asked_of(fit_bands, [2.0, 4.0, 30.0], [3e-6, 2e-6]) == [2.0, 30.0, 0.5, 0.01]
     assert asked_of(fit_bands, [0.0, 4.0, 30.0], [3e-6, 2e-6]) == [0.4, 30.0, 0.5, 0.01]
+
+
+def test_a_fit_has_the_name_and_the_source_that_it_is_given(monkeypatch):
+    """Of a table and of bands that one pole at 3 Hz has exactly."""
+    pole = terms.Term("first-order", 4e-12, 3.0)
+    monkeypatch.setattr(fits, "fit_terms", lambda *given, **more: [pole])
+    freq = np.geomspace(0.1, 300.0, 400)
+    columns = freq, terms.term_density(pole, freq)
+    edges = np.array([0.0, 1.0, 10.0])
+    rms = np.sqrt(4e-12 * 2 / pi * np.diff(np.arctan(edges / 3.0)))
+    for found, name, source in (
+        (disturbance.fit_table(*columns, convention="per-axis", name="hum", source="a page"), "hum", "a page"),
+        (disturbance.fit_table(*columns, convention="per-axis"), "table", "given"),
+        (disturbance.fit_bands(edges, rms, convention="per-axis", name="hum", source="a page"), "hum", "a page"),
+        (disturbance.fit_bands(edges, rms, convention="per-axis"), "bands", "given"),
+    ):
+        assert (found.disturbance.name, found.disturbance.source) == (name, source)
+        assert found.disturbance.variance_rad2 == pytest.approx(4e-12, rel=1e-9)
+    for more, name in (({}, "vibration"), ({"name": "hum"}, "hum")):
+        alone = disturbance.fit_spectrum(*columns, convention="per-axis", **more)
+        assert (alone.name, alone.source) == (name, "given")
+    with pytest.raises(ValueError, match=r'"hum": the best filter of a few terms is 6\.0 dB above the table near'):
+        disturbance.fit_spectrum(freq, columns[1] / 4.0, convention="per-axis", name="hum")

@@ -689,3 +689,18 @@ def test_points_around_a_pole_reach_five_times_its_frequency_or_twice_its_width_
     whole = 0.2 * 15.0 * np.exp(np.linspace(0, math.log(100.0), math.ceil(math.log(100.0) / math.log(ratio)) + 1))
     assert_allclose(above, whole[whole < 0.5 / PERIOD - 300.0], rtol=1e-6)
     assert_allclose(300.0 - found[found < 300.0 * (1 - 1e-9)][::-1], whole[whole < 300.0 * (1 - 1e-9)], rtol=1e-6)
+
+
+@pytest.mark.parametrize("output", range(4))
+def test_variances_by_source_are_those_of_the_output_that_is_asked_for(output):
+    """Residual, optical reading, gauge and command, each by disturbance, optical noise and gauge noise."""
+    plant = axis_plant(gauge_noise_rad=0.5e-6)
+    controller = both_sensors(plant)
+    row = analysis.h2(analysis.close(plant, controller))[output]
+    found = analysis.by_source(plant, controller, output)
+    n = plant.disturbances
+    assert found == {
+        "disturbance": near(row[:n].sum()), "optical noise": near(row[n]), "gauge noise": near(row[n + 1 :].sum())
+    }  # fmt: skip
+    own = analysis.by_source(plant, controller)
+    assert (found == own) == (output == RESIDUAL)

@@ -791,3 +791,18 @@ def test_what_is_kept_of_a_recording_of_another_rate_begins_behind_its_edge_and_
     alone = stationary(close(replace(parts, disturbances=((line,),)), controller)).error_by_source[line.name][0]
     assert with_it.fitted_rms_rad**2 - plain.fitted_rms_rad**2 == pytest.approx(alone, rel=1e-6)
     assert alone > 0.1 * plain.fitted_rms_rad**2
+
+
+def test_no_more_lines_are_told_than_a_recording_may_have_and_the_others_are_left_in_it(monkeypatch):
+    time = 1e-3 * np.arange(4000)
+    given = [SpectralLine(3e-6, 210.3), SpectralLine(9e-6, 47.2), SpectralLine(6e-6, 120.9), SpectralLine(1e-6, 333.3)]
+    waves = [x.amplitude_rad * np.sin(2 * math.pi * x.freq_hz * time) for x in given]
+    samples = sum(waves) + 1e-8 * np.random.default_rng(5).standard_normal(time.size)
+    monkeypatch.setattr(recorded_lines, "_MOST_LINES", 2)
+    found, rest = find_lines(samples, 1e-3)
+    assert [(x.freq_hz, x.amplitude_rad) for x in found] == [
+        pytest.approx((47.2, 9e-6), rel=1e-3), pytest.approx((120.9, 6e-6), rel=1e-3)
+    ]  # fmt: skip
+    assert_allclose(rest, waves[0] + waves[3], atol=2e-7)
+    monkeypatch.setattr(recorded_lines, "_MOST_LINES", 4)
+    assert len(find_lines(samples, 1e-3)[0]) == 4

@@ -11,6 +11,8 @@ from numpy.testing import assert_allclose
 
 from microrad.loop.disturbance import Disturbance, SpectralLine, first_order
 from microrad.loop.disturbance.windows import ErrorIndex
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import simulated_windows as simulation
 from microrad.loop.pointing_loop.ensemble import Span
 from microrad.loop.pointing_loop.linear import close, residual_spectrum
 from microrad.loop.pointing_loop.simulated_windows import (
@@ -315,3 +317,18 @@ def test_a_window_may_fill_a_run_and_a_loop_in_which_nothing_moves_has_no_interv
     assert (nothing.rms_rad, nothing.interval_rad, nothing.linear_rad) == (0.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="PDE looks at 41 ms of a run, and 40 ms are left behind its settling"):
         simulated(PLAIN, (ErrorIndex("PDE", 0.011, 0.03),), span, 2)
+
+
+@pytest.mark.parametrize("threads", [None, 3])
+def test_runs_are_shared_out_to_the_threads_that_are_asked_for(monkeypatch, threads):
+    asked, span = [], Span(0.02, 0.005, 1)
+
+    def in_threads(jobs, tell=None, workers=None):
+        asked.append((len(jobs), workers))
+        return [job() for job in jobs]
+
+    for module in (simulation, ensemble):
+        monkeypatch.setattr(module, "in_threads", in_threads)
+    simulated(PLAIN, INDICES[:1], span, 65, threads=threads)
+    ensemble.simulate(PLAIN.parts, PLAIN.assembled(TRACKING), span, 130, threads=threads)
+    assert asked == [(2, threads), (3, threads)]

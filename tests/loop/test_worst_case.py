@@ -537,3 +537,43 @@ def test_a_parameter_that_no_mirror_may_be_moved_by_has_no_sensitivity_and_those
     assert (*gain.rms, gain.modulus) == pytest.approx((0.1, 0.0, 0.1))
     assert (zero.rms, zero.modulus, zero.largest) == ((0.0, 0.0), 0.0, 0.0)
     assert asked == [(4, ["APE", "RPE"], None)]
+
+
+def test_many_mirrors_are_worked_on_in_parts_by_the_threads_that_are_asked_for_and_stand_in_their_order(monkeypatch):
+    asked = []
+
+    def together(loop, controller, margins, part, indices):
+        assert (loop, controller, margins, indices) == (
+            "loop",
+            "straight PI",
+            ("margins", "loop", "straight PI"),
+            (APE,),
+        )
+        return worst_case.Figures(np.array(part)[:, None] * 1.0, np.array(part) + 0.25, np.array(part) + 0.5)
+
+    def in_threads(jobs, workers):
+        asked.append((len(jobs), workers))
+        return [job() for job in jobs]
+
+    monkeypatch.setattr(batch, "straightened", lambda controller, loop: f"straight {controller}")
+    monkeypatch.setattr(batch, "Margins", lambda *given: ("margins", *given))
+    monkeypatch.setattr(batch, "_together", together)
+    monkeypatch.setattr(batch, "in_threads", in_threads)
+    monkeypatch.setattr(batch, "AT_ONCE", 3)
+    found = batch.figures("loop", "PI", (7, 5, 6, 2, 4), (APE,), 6)
+    assert asked == [(2, 6)]
+    assert found.rms_rad.tolist() == [[7.0], [5.0], [6.0], [2.0], [4.0]]
+    assert (found.modulus - 0.25).tolist() == (found.pole - 0.5).tolist() == [7.0, 5.0, 6.0, 2.0, 4.0]
+    assert batch.figures("loop", "PI", (0, -1, 0.5), (APE,)).unstable == 1
+    assert asked[1] == (1, None)
+
+
+def test_a_parameter_without_a_standard_error_is_not_moved(tmp_path):
+    known = worst_case.of_table(table_of(tmp_path, (0.02, 0.0, 0.1)).mission.mirror)
+    assert np.isfinite(known.rows).all()
+    assert not known.rows[1].any()
+    drawn = known.drawn(5, 3)
+    assert len(drawn) == 5
+    for each in (*drawn, *(known.moved(sign * row) for row in np.eye(known.rows.shape[1]) for sign in (1.0, -1.0))):
+        assert np.isfinite(each.sigmas).all()
+        assert each.sigmas[1] == 0.0
