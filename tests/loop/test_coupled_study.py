@@ -985,3 +985,57 @@ def test_families_in_turn_begin_with_the_one_that_others_contain_and_a_refused_o
     asked.clear()
     assert designs._designed_in_turn("scene", [peaks, pi], "narrow")["PI"] == "PI is out of reach"
     assert asked == [("PI", "narrow", None), ("PI + peaks", "narrow", None)]
+
+
+def test_the_optimum_of_several_axes_is_lqg_at_no_price_about_rest(monkeypatch):
+    asked = []
+
+    def lqg_of_axes(plant, weights):
+        asked.append((plant, weights))
+        return SimpleNamespace(name="free", system="system", anti_windup="windup")
+
+    monkeypatch.setattr(designs, "lqg_of_axes", lqg_of_axes)
+    monkeypatch.setattr(designs, "decoupling", lambda loop: f"drives of {loop}")
+    monkeypatch.setattr(designs, "whole_plant", lambda *given: given)
+    monkeypatch.setattr(designs, "assemble_whole", lambda *given: given)
+    monkeypatch.setattr(designs, "close", lambda *given: given)
+    monkeypatch.setattr(designs, "stationary", lambda closed: SimpleNamespace(radial_rms_rad=closed))
+    found = designs.optimum_rms_rad(SimpleNamespace(rest="rest", loop="loop"))
+    assert found == ("rest", ("free", "rest", "system", "windup"))
+    assert asked == [(("rest", "drives of rest"), control.Weights(1e-6, 1.0, 0.0, 1.0))]
+
+
+def test_a_study_of_several_axes_simulates_what_was_designed_and_tells_of_both(monkeypatch):
+    made = designs.CoupledDesigns(("a", "b"), {"c": "refused"})
+    monkeypatch.setattr(designs, "design", lambda *given: made if given == ("scene", print) else None)
+    monkeypatch.setattr(designs, "optimum_rms_rad", lambda scene: f"optimum of {scene}")
+    monkeypatch.setattr(designs, "simulated", lambda *given: given)
+    assert designs.design_and_simulate("scene", print) == ("scene", ("a", "b"), "optimum of scene", print)
+
+
+def test_an_outlook_of_several_axes_holds_each_axis_of_each_design_against_its_own_linear_figure(monkeypatch):
+    asked = []
+
+    def shortened(*given):
+        asked.append(given)
+        return [SimpleNamespace(axis_rms_rad=np.array(each)) for each in ((3.0, 9.0), (5.0, 2.0))]
+
+    monkeypatch.setattr(designs, "shortened", shortened)
+    made = [SimpleNamespace(controller=n, residual_rad=np.array(v)) for n, v in (("A", [2.0, 8.0]), ("B", [4.0, 1.0]))]
+    found = designs.outlook(SimpleNamespace(table="table", loop="loop", rest="rest"), made, print)
+    assert asked == [("table", "loop", ["A", "B"], print)]
+    assert [each.axes for each in found] == [
+        (Outlook(2.0, 3.0), Outlook(8.0, 9.0)), (Outlook(4.0, 5.0), Outlook(1.0, 2.0))
+    ]  # fmt: skip
+    assert [each.holds for each in found] == [True, False]
+
+
+def test_where_no_controller_can_be_had_each_says_why(monkeypatch):
+    kinds = [control.PI, SimpleNamespace(name="LQG", base=None), SimpleNamespace(name="H-infinity", base=None)]
+    monkeypatch.setattr(designs, "names", lambda f: ("PI", "LQG", "H-infinity"))
+    monkeypatch.setattr(designs, "families", lambda f: kinds)
+    monkeypatch.setattr(designs, "plants", lambda scene: ())
+    monkeypatch.setattr(designs, "_designed_in_turn", lambda scene, some, of: {f.name: f"no {f.name}" for f in some})
+    with pytest.raises(ValueError) as refused:
+        designs.design(SimpleNamespace(table=None), only=("H-infinity", "PI", "LQG"))
+    assert str(refused.value) == "no H-infinity; no PI; no LQG"

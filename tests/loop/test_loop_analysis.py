@@ -704,3 +704,27 @@ def test_variances_by_source_are_those_of_the_output_that_is_asked_for(output):
     }  # fmt: skip
     own = analysis.by_source(plant, controller)
     assert (found == own) == (output == RESIDUAL)
+
+
+def test_margins_at_either_cut_are_those_of_both_cuts_at_once():
+    plant = axis_plant(gauge_noise_rad=0.5e-6)
+    controller = both_sensors(plant)
+    command, optical = analysis.margins_of_cuts(plant, controller)
+    for found, expected in (
+        (analysis.margins_at(plant, controller), command),
+        (analysis.margins_at(plant, controller, "optical"), optical),
+    ):
+        assert (found.modulus, found.disk, found.phase_rad) == near(
+            (expected.modulus, expected.disk, expected.phase_rad)
+        )
+    assert abs(command.modulus - optical.modulus) > 1e-3
+
+
+@pytest.mark.parametrize(("off", "fits"), [(5e-10, True), (-5e-10, True), (2e-9, False), (-1e-7, False)])
+def test_a_controller_fits_a_plant_of_its_own_period_but_for_rounding(off, fits):
+    plant, controller = axis_plant(), pi(1e3, 5e6)
+    if fits:
+        assert analysis.refuse_misfit(plant, controller, plant.period_s * (1.0 + off)) is None
+        return
+    with pytest.raises(ValueError, match=r"is made for a period of .* s, the plant is sampled every .*design it again"):
+        analysis.refuse_misfit(plant, controller, plant.period_s * (1.0 + off))

@@ -806,3 +806,15 @@ def test_no_more_lines_are_told_than_a_recording_may_have_and_the_others_are_lef
     assert_allclose(rest, waves[0] + waves[3], atol=2e-7)
     monkeypatch.setattr(recorded_lines, "_MOST_LINES", 4)
     assert len(find_lines(samples, 1e-3)[0]) == 4
+
+
+@pytest.mark.parametrize(("order", "taken"), [(None, True), (1, True), (24, True), (0, False), (25, False)])
+def test_a_filter_of_a_recording_has_1_to_24_states(monkeypatch, order, taken):
+    def begun(*_):
+        raise LookupError("begun")
+
+    monkeypatch.setattr(recorded_fit, "find_lines", begun)
+    said = "begun" if taken else f'"hum": a shaping filter of {order} states; give 1 to 24'
+    with pytest.raises(LookupError if taken else ValueError) as ended:
+        fit_recording(np.sin(np.arange(300.0)), 1e-3, order=order, name="hum")
+    assert ended.value.args == (said,)

@@ -21,7 +21,7 @@ from microrad.loop.pointing_loop.loop import assemble, assemble_whole, decouplin
 from microrad.loop.pointing_loop.windows import windowed_errors
 from microrad.loop.worst_case import APE, Extent, Simulated, Subject, batch, in_time, search
 from microrad.mirror import coupled, from_table, spread
-from microrad.mirror.hysteresis import rest_gain
+from microrad.mirror.hysteresis import PrandtlIshlinskii, rest_gain
 from microrad.mirror.model import linearised
 from microrad.mission.file import load_loop
 from microrad.report.fine_pointing.worst_case import worst_case_data, worst_case_text
@@ -577,3 +577,35 @@ def test_a_parameter_without_a_standard_error_is_not_moved(tmp_path):
     for each in (*drawn, *(known.moved(sign * row) for row in np.eye(known.rows.shape[1]) for sign in (1.0, -1.0))):
         assert np.isfinite(each.sigmas).all()
         assert each.sigmas[1] == 0.0
+
+
+def test_a_subject_is_an_axis_that_stands_for_all_or_all_axes_about_rest(monkeypatch):
+    monkeypatch.setattr(search, "on_one_axis", lambda design, scene: (design.controller, scene.axis))
+    axis = SimpleNamespace(controller="PI")
+    scene = SimpleNamespace(axis="x alone", loop=SimpleNamespace(axes=3), rest="at rest")
+    one, whole = worst_case.of_scene(scene, "known", axis), worst_case.of_coupled_scene(scene, "known", axis)
+    assert (one.theory, one.alike, one.known, one.controller) == ("x alone", 3, "known", ("PI", "x alone"))
+    assert (one.simulated.loop, one.simulated.at_rest) == ("x alone", False)
+    assert (whole.theory, whole.alike, whole.known, whole.controller) == ("at rest", 1, "known", "PI")
+    assert (whole.simulated.loop, whole.simulated.at_rest) == (scene.loop, True)
+
+
+@pytest.mark.parametrize(("alike", "at_rest", "gain"), [(4, False, 1.75), (1, True, 1.0)])
+def test_figures_of_mirrors_are_of_their_elements_gains_at_rest_or_of_slow_motion_for_so_many_axes(
+    monkeypatch, alike, at_rest, gain
+):
+    """Plays of 1 at threshold 0 and 0.75 beyond it: at rest the first alone."""
+    asked = []
+
+    def figures(*given):
+        asked.append(given)
+        return worst_case.Figures(np.array([[3.0, 5.0]]), np.array([0.5]), np.array([0.9]))
+
+    monkeypatch.setattr(search, "figures", figures)
+    plays = PrandtlIshlinskii((0.0, 1.0), (1.0, 0.75))
+    mirrors = [search.Moved(SimpleNamespace(bank=bank, linear=tuple), None) for bank in ((plays, plays), ())]
+    subject = Subject("theory", alike, Simulated("loop", "PI", at_rest), None)
+    found = subject.figures(mirrors, (APE,), 5)
+    assert asked == [("theory", "PI", [(gain, gain), ()], (APE,), 5)]
+    assert found.rms_rad.tolist() == [[3.0 * alike**0.5, 5.0 * alike**0.5]]
+    assert (found.modulus.tolist(), found.pole.tolist()) == ([0.5], [0.9])
