@@ -1179,3 +1179,10 @@ def test_an_adaptive_inverse_learns_and_the_same_inverse_without_that_name_does_
     assert [len(each.system.C) for each in (made, frozen)] == [8, 6]
     design = designs.Design(designs.ADAPTIVE, SimpleNamespace(controller=axis), made, "in series")
     assert len(designs.on_one_axis(design, here).adaptation.plays) == 1
+
+
+def test_a_sensor_said_to_have_no_noise_has_none_whatever_light_there_is(file):
+    f = file.mission.fine_pointing
+    quiet = f.model_copy(update={"optical_sensor": f.optical_sensor.model_copy(update={"noise_rad": 0.0})})
+    for light in (None, 5e-9):
+        assert scenario.optical_sensor(quiet, light, 1.55e-6, 0.1).noise_rad == 0.0

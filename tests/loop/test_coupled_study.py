@@ -1039,3 +1039,17 @@ def test_where_no_controller_can_be_had_each_says_why(monkeypatch):
     with pytest.raises(ValueError) as refused:
         designs.design(SimpleNamespace(table=None), only=("H-infinity", "PI", "LQG"))
     assert str(refused.value) == "no H-infinity; no PI; no LQG"
+
+
+def test_gains_over_the_range_are_those_of_the_farther_end_and_at_rest_of_elements_that_no_drive_reaches():
+    plays = two_axes()
+    rest, far = coupled_scene._gains(plays, (-60.0, 40.0))
+    assert coupled_scene._gains(plays, (-40.0, 60.0)) == coupled_scene._gains(plays, (-60.0, 60.0)) == (rest, far)
+    _, near = coupled_scene._gains(plays, (-40.0, 40.0))
+    assert all(abs(f - r) > abs(n - r) > 0.0 for r, n, f in zip(rest, near, far, strict=True))
+    m = plays.mirror
+    first = np.arange(len(m.bank))[:, None] == 0
+    unreached = replace(m, F=np.where(first, 0.0, m.F), G=np.where(first, 0.0, m.G))
+    still, moved = coupled_scene._gains(replace(plays, mirror=unreached), (-60.0, 40.0))
+    assert (still, moved[0]) == (rest, rest[0])
+    assert moved[1] != rest[1]

@@ -1505,3 +1505,12 @@ def test_a_fit_has_the_name_and_the_source_that_it_is_given(monkeypatch):
         assert (alone.name, alone.source) == (name, "given")
     with pytest.raises(ValueError, match=r'"hum": the best filter of a few terms is 6\.0 dB above the table near'):
         disturbance.fit_spectrum(freq, columns[1] / 4.0, convention="per-axis", name="hum")
+
+
+@pytest.mark.parametrize("first", ["NaN 3", "nan 3", "NAN\t3"])
+def test_a_first_row_that_is_no_number_is_a_row_in_whatever_letters_and_no_heading(first):
+    with pytest.raises(ValueError) as refused:
+        typed("Hz rad^2/Hz", first, "1 2", "2 2", "3 4")
+    assert str(refused.value) == (
+        "measured.csv, line 2: (nan Hz, 3 rad^2/Hz) holds a number that is not finite; remove the row"
+    )

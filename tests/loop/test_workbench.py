@@ -595,3 +595,15 @@ def test_disturbances_in_a_list_are_added_up_as_those_in_a_tuple():
 def test_one_row_of_samples_is_no_reference_of_two_axes():
     with pytest.raises(ValueError, match=re.escape("shape (6,): give finite samples of shape (samples, 2)")):
         ON_TWO.simulate(OF_TWO, 0.1, reference_rad=np.zeros(6))
+
+
+def test_a_gauge_without_noise_is_a_gauge():
+    perfect, none = replace(LOOP, gauge_noise_rad=0.0), replace(LOOP, gauge_noise_rad=None)
+    assert (perfect.parts.gauge, none.parts.gauge) == (StrainGauge(0.0, 0.0), None)
+    s = SLOW.system
+    reads = replace(SLOW, system=lti.StateSpace(s.A, np.pad(s.B, ((0, 0), (0, 1))), s.C, np.array([[s.D[0, 0], 0.5]])))
+    assert perfect.assembled(reads).system.D[0, 1] == pytest.approx(0.5)
+    with pytest.raises(ValueError, match="controller 'PID' reads a strain gauge, and this loop has none"):
+        none.assembled(reads)
+    with pytest.raises(ValueError, match="needs one line-of-sight angle for each output of the mirror"):
+        replace(LOOP, optics=[[1.0], [1.0]], gauge_noise_rad=0.0)
