@@ -907,7 +907,7 @@ drift = ["3 urad/s", "7 urad/s"]
     ("limits", "slew", "drive", "identified"),
     [
         ([(50.0, 5.0, 85.0, 3e4), (45.0, 0.0, 99.0, 1e5), (55.0, 15.0, 99.0, 2e4)], 2e4, (-45.0, 45.0), (-40.0, 35.0)),
-        ([(50.0, 0.0, 99.0, 2e4), (62.0, 0.0, 120.0, 1e4), (60.0, 1.0, 130.0, 9e4)], 1e4, (-50.0, 38.0), (-50.0, 49.0)),
+        ([(30.0, 0.0, 99.0, 2e4), (50.0, 0.0, 120.0, 1e4), (40.0, 1.0, 130.0, 9e4)], 1e4, (-30.0, 50.0), (-30.0, 69.0)),
     ],
 )  # fmt: skip
 def test_a_loop_of_several_axes_is_driven_as_its_narrowest_actuators_allow(
@@ -1047,9 +1047,20 @@ def test_gains_over_the_range_are_those_of_the_farther_end_and_at_rest_of_elemen
     assert coupled_scene._gains(plays, (-40.0, 60.0)) == coupled_scene._gains(plays, (-60.0, 60.0)) == (rest, far)
     _, near = coupled_scene._gains(plays, (-40.0, 40.0))
     assert all(abs(f - r) > abs(n - r) > 0.0 for r, n, f in zip(rest, near, far, strict=True))
-    m = plays.mirror
+    first_play, *others = plays.mirror.plays
+    thresholds, weights = (0.0, *first_play.thresholds_v[1:]), (0.25, *first_play.weights_rad_v[1:])
+    stiff = replace(first_play, thresholds_v=thresholds, weights_rad_v=weights)
+    m = replace(plays.mirror, plays=(stiff, *others))
     first = np.arange(len(m.bank))[:, None] == 0
     unreached = replace(m, F=np.where(first, 0.0, m.F), G=np.where(first, 0.0, m.G))
     still, moved = coupled_scene._gains(replace(plays, mirror=unreached), (-60.0, 40.0))
-    assert (still, moved[0]) == (rest, rest[0])
+    assert (still, moved[0]) == ([0.25, *rest[1:]], 0.25)
     assert moved[1] != rest[1]
+
+
+def test_a_mirror_that_its_drives_do_not_move_at_all_is_refused():
+    plain = three_actuators()
+    with pytest.raises(
+        ValueError, match=r"the 3 actuator\(s\) of 'a plate' do not move the line of sight in both axes"
+    ):
+        scene_of(replace(plain, mirror=replace(plain.mirror, B=0.0 * plain.mirror.B)))

@@ -818,3 +818,29 @@ def test_a_filter_of_a_recording_has_1_to_24_states(monkeypatch, order, taken):
     with pytest.raises(LookupError if taken else ValueError) as ended:
         fit_recording(np.sin(np.arange(300.0)), 1e-3, order=order, name="hum")
     assert ended.value.args == (said,)
+
+
+def test_a_recording_is_simulated_alone_without_any_noise_of_its_sensors_and_told_about_its_mean(monkeypatch):
+    asked = []
+
+    def simulate(loop, controller, span, runs):
+        asked.append((loop, controller, span, runs))
+        return SimpleNamespace(rms_rad=np.array([[5.0]]), mean_rad=np.array([[-3.0]]))
+
+    monkeypatch.setattr(played, "simulate", simulate)
+    parts = replace(LOOP, gauge_noise_rad=2e-7).parts
+    parts = replace(
+        parts, gauge=replace(parts.gauge, resolution_rad=3e-9), unknown=("anything",), references=("moved",)
+    )
+    moved = np.arange(45.0)
+    assert played._simulated(parts, "controller", moved, "span") == 4.0
+    ((loop, *others),) = asked
+    assert others == ["controller", "span", 1]
+    assert (loop.gauge.noise_rad, loop.gauge.resolution_rad, loop.optical.noise_rad) == (0.0, 3e-9, 0.0)
+    assert (loop.optical, loop.disturbances) == (replace(parts.optical, noise_rad=0.0), ((),))
+    (own,), (still,) = loop.unknown, loop.references
+    period = parts.timing.period_s
+    assert own.at(period * np.arange(6)).tolist() == [0.0, 10.0, 20.0, 30.0, 40.0, 40.0]
+    assert still.at(np.array([0.0, 9.0])).tolist() == [0.0, 0.0]
+    assert played._simulated(replace(parts, gauge=None), "controller", moved, "span") == 4.0
+    assert asked[1][0].gauge is None
