@@ -1239,6 +1239,8 @@ def test_a_rate_that_is_solved_for_is_in_place_of_no_other_although_the_comment_
     path.write_text(text.replace(stated, stated.replace('"300 Mbit/s"', '"largest"')), "utf-8")
     file = link_study.solve_rate(load_link(path))
     assert file.sources["communication.data_rate"].text == "solved for: the largest with 3 dB at 10 µrad"
+
+
 @pytest.mark.parametrize("shaken", [{}, SHAKEN, {"jitter": SHAKEN["jitter"] | {"rms": ["3 urad", "9 urad"]}}])
 def test_the_best_radius_of_a_beam_is_that_at_the_margin_which_its_budget_has(tmp_path, shaken):
     """Where the beam is shaken, a narrower one in the aperture leaves more, as it is wider afar."""
