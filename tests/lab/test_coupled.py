@@ -1386,3 +1386,38 @@ def test_outputs_have_as_many_positions_or_none(positions, told, quantity):
         found = channels_module._outputs(record, quantity, positions)
         expected = told or [None, None]
         assert found == tuple(Output(name, quantity, place) for name, place in zip("xy", expected, strict=True))
+
+
+def test_what_is_known_of_each_output_is_what_its_own_drive_and_records_say():
+    """Three outputs of two drives: each with its strongest drive as if these two were alone."""
+    draw = philox(5).standard_normal
+    freq = np.arange(1.0, 61.0)
+    gain = 0.01 * (draw((60, 3, 2)) + 1j * draw((60, 3, 2)))
+    pairs = ((0, 1), (1, 0), (2, 1))
+    for k, (o, i) in enumerate(pairs):
+        one = ModalModel(
+            np.array([-20.0 + 90j * (k + 1)]), np.array([[2.0 + 0j]]), np.array([[30.0 - 5j]]), np.zeros((1, 1))
+        )
+        gain[:, o, i] += one.response(freq, "first-order", 2000.0)[:, 0, 0]
+    table = table_of(gain, (1.0, 3.0))
+    drive, output = (draw((5, 60, n)) + 1j * draw((5, 60, n)) for n in (2, 3))
+    fitted = linear.per_axis(table, 2, 1e-4, linear_errors.LineSpectra(drive, output))
+    alone = []
+    for o, i in pairs:
+        own = replace(
+            table, response=gain[:, o : o + 1, i : i + 1], drive_power=table.drive_power[:, i:, i:][:, :1, :1]
+        )
+        spectra = linear_errors.LineSpectra(drive[:, :, i : i + 1], output[:, :, o : o + 1])
+        alone.append(linear.per_axis(own, 2, 1e-4, spectra))
+    np.testing.assert_allclose(
+        fitted.known.standard_errors, np.concatenate([a.known.standard_errors for a in alone]), rtol=1e-5
+    )
+    factor = np.vstack([a.known.factor for a in alone])
+    np.testing.assert_allclose(fitted.known.correlation, factor @ factor.T, atol=1e-5)
+    np.testing.assert_allclose(
+        fitted.poles_error_rad_s, np.concatenate([a.poles_error_rad_s for a in alone]), rtol=1e-5
+    )
+    names = [name for name in fitted.known.parameters if ".D." in name or "decay" in name]
+    assert names == [
+        name for k, (o, i) in enumerate(pairs, 1) for name in (f"modes.decay.{k}", f"matrices.D.{o + 1}.{i + 1}")
+    ]

@@ -1648,3 +1648,39 @@ def test_the_colour_of_a_residual_of_one_step_is_the_sum_of_its_correlations_unt
 )
 def test_a_difference_of_two_standard_errors_is_no_chance(losses, best, chance):
     assert may_be_chance([np.array(each) for each in losses], [np.array(each) for each in best]) is chance
+
+
+@pytest.mark.parametrize(
+    ("uses", "loops", "wide"),
+    [
+        ("loops loops validation broadband broadband", "0.csv, 1.csv", "3.csv, 4.csv"),
+        ("loops validation loops", "0.csv, 2.csv", "0.csv, 2.csv"),
+        ("broadband validation loops broadband", "2.csv", "0.csv, 3.csv"),
+    ],
+)
+def test_a_linear_part_comes_from_the_broadband_recordings_or_from_all_that_were_fitted(uses, loops, wide):
+    model = PrandtlIshlinskii((0.0, 1.0), (6e-5, 2e-5))
+    values = [5e-5, 2.5e-5, *OF_LINEAR]
+    given = "prandtl_ishlinskii_joint", model, values, ERRORS[: len(values)]
+    made = joint_identification(*given, linear=JOINT_LINEAR, band=EXCITED)
+    vars(made)["sources"] = tuple(
+        choice.RecordingUse(f"in/{k}.csv", f"{k}", 9 * (role != "validation"), 9, role)
+        for k, role in enumerate(uses.split())
+    )
+    text = mirror_file_text(made, "m")
+    sources = {line.partition(" = ")[0]: line.rpartition("from ")[2] for line in text.split("\n") if " = " in line}
+    assert [sources[key] for key in ("travel", "thresholds", "bias", "standard_errors")] == [loops] * 4
+    keys = ("poles", "pole_dampings", "zeros", "zero_dampings", "excited_from", "excited_to")
+    assert [sources[key] for key in keys] == [wide] * 6
+
+
+def test_many_samples_of_several_records_are_thinned_alike_to_twelve_thousand():
+    sizes = {"a": 20_000, "b": 4_001, "c": 12_000}
+    records = [SiRecord(name, "", np.arange(n) % 7.0, np.arange(n) % 5.0, 0.01, 5) for name, n in sizes.items()]
+    problem = bouc_wen_of.BoucWenProblem(tuple(records[:2]), 0.5, 250.0)
+    thin = bouc_wen_of._thin_problem(problem)
+    assert [r.drive_v.size for r in thin.records] == [6667, 1334]  # every third sample
+    assert [r.step_s for r in thin.records] == pytest.approx([0.03, 0.03])
+    assert (thin.share, thin.rate_limit) == (0.5, 250.0)
+    few = bouc_wen_of.BoucWenProblem((records[2],), 0.5, 250.0)
+    assert bouc_wen_of._thin_problem(few) is few

@@ -1066,3 +1066,39 @@ def test_a_whole_number_of_another_type_is_an_order():
 def test_an_order_that_is_no_number_is_refused(order):
     with pytest.raises(IdentificationError, match=rf"^the order is {order}; give a whole number of poles\.$"):
         fit_module.given_orders(np.arange(1.0, 9.0), order)
+
+
+def test_a_tone_is_told_by_the_longest_of_several_records_and_sought_in_all_of_them():
+    """Records of 1 s and of 4 s: a pair that rings for 6 s rings for six times the first and is no tone of the two."""
+    long = recording(philox(1).standard_normal((4000, 1)), np.zeros((4000, 1)), 1000.0)
+    short = replace(long, drive=0.01 * long.drive[:1000], output=long.output[:1000])
+
+    def told(decay_s, *records, share=0.3):
+        pole = -1.0 / decay_s + 2j * np.pi * 50.0
+        model = ModalModel(np.array([pole]), np.ones((1, 1)) + 0j, np.ones((1, 1)) + 0j, np.zeros((1, 1)))
+        own = np.concatenate([simulate(model, r.drive - r.drive[:1], 1000.0) for r in records]).std()
+        return fit_module._tones(model, records, np.array([own / share]), "zero-order")
+
+    assert len(told(6.0, short)) == 1 and told(6.0, short, long) == told(6.0, long, short) == []
+    for records in ((short, long), (long, short)):
+        (found,) = told(21.0, *records)
+        assert found.startswith("pole at 50 Hz rings for 21 s, the recording lasts 4 s and cannot show that: most")
+        assert "most likely a steady tone" in found
+        assert "most likely noise" in told(21.0, *records, share=0.2)[0]
+
+
+def test_the_fit_of_records_of_unlike_length_is_about_the_mean_of_each():
+    """Two records with two outputs; the first samples of each are left out, and each rests at a level of its own."""
+    records = [
+        Recording(name, "", np.zeros((n, 1)), level + philox(n).standard_normal((n, 2)), 100.0, ("u",), ("y", "z"))
+        for name, n, level in (("a", 50, 7.0), ("b", 80, -3.0))
+    ]
+    errors = [0.25 * (r.output[10:] - r.output[10:].mean(axis=0)) * [1.0, 2.0] for r in records]
+    model = ModalModel(np.array([-9.0 + 0j]), np.array([[1.0]]) + 0j, np.array([[3.0], [4.0]]) + 0j, np.zeros((2, 1)))
+    ones = np.ones((2, 1))
+    known = Uncertainty(np.array([-60.0 + 0j]), np.ones(1), np.zeros(0), np.zeros(0), ones, ones, ones, ones, 0.0)
+    response = SimpleNamespace(hold="zero-order", rate_hz=100.0, excited_hz=(2.0, 40.0))
+    found = fit_module.with_evidence(model, records, errors, response, np.zeros(0), known, [], "why")
+    np.testing.assert_allclose(found.fit_percent, [75.0, 50.0], rtol=1e-12)
+    squares = sum(np.sum(e**2, axis=0) for e in errors)
+    np.testing.assert_allclose(found.residual_rms, np.sqrt(squares / 110), rtol=1e-12)

@@ -1054,3 +1054,23 @@ def test_what_no_draw_can_make_a_mirror_of_is_refused_in_all_words(monkeypatch):
         "table uncertainty out"
     )
     assert directions(replace(handmade(), known=known)) == 1 and draws(handmade(), 3, 1) == ()
+
+
+def test_numbers_of_elements_that_all_change_places_stay_with_their_elements():
+    """The file has both plays before the Bouc-Wen element, which is the first of the mirror."""
+    data = tomllib.loads(coupled.text(handmade()))
+    one, two, three = (data["hysteresis"][key] for key in "123")
+    data["hysteresis"] = {"1": two, "2": three, "3": one}
+    names = [
+        *("hysteresis.1.widening", "hysteresis.2.polynomial.3", "hysteresis.3.epsilon"),
+        *("matrices.E.2.1", "matrices.K.1.2", "matrices.G.3.1"),
+    ]
+    data["uncertainty"] = {"parameters": names, "standard_errors": [0.1] * 6, "factor": np.eye(6).tolist()}
+    found = coupled.of(Table.model_validate(data))
+    assert found.mirror.bank == handmade().mirror.bank
+    np.testing.assert_array_equal(found.mirror.E, handmade().mirror.E[:, [2, 0, 1]])
+    np.testing.assert_array_equal(found.mirror.G, handmade().mirror.G[[2, 0, 1]])
+    assert found.known.parameters == (
+        *("hysteresis.2.widening", "hysteresis.3.polynomial.3", "hysteresis.1.epsilon"),
+        *("matrices.E.2.2", "matrices.K.1.3", "matrices.G.1.1"),
+    )

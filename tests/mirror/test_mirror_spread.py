@@ -699,3 +699,19 @@ def test_what_a_file_would_refuse_is_no_moved_mirror(read, text, names, factors)
 def test_a_factor_of_0_turns_a_value_and_a_small_one_does_not(read, names, factors, moved):
     found = mirror_spread.moved(read(BOUC_WEN + table(names, [0.5] * len(names))), np.array(factors))
     assert (found is not None) == moved
+
+
+def test_what_refuses_most_draws_is_told_with_how_often(read, monkeypatch):
+    """Of five draws two turn d1 and four a pole, one of them both; a sixth would be a mirror."""
+    monkeypatch.setattr(mirror_spread, "TRIES", 5)
+    mirror = read(BOUC_WEN + table(["bouc_wen.d1", "linear.poles.1"], [0.5, 0.5]))
+    others = np.array([[0.0, -3.0], [0.0, -2.0], [-3.0, -3.0], [0.0, -4.0], [0.0, 0.0]])
+    with pytest.raises(ValueError) as caught:
+        mirror_spread.parameters(mirror, np.array([[-3.0, 0.0]]), lambda row: iter(others))
+    assert str(caught.value) == (
+        'the uncertainty of the mirror "m" leaves no mirror: none of 5 draws is one, 4 times because linear.poles.1 '
+        "would change its sign; give smaller standard errors, or leave such a parameter out"
+    )
+    monkeypatch.setattr(mirror_spread, "TRIES", 6)
+    found = mirror_spread.parameters(mirror, np.array([[-3.0, 0.0]]), lambda row: iter(others))
+    assert_allclose(found, [[80e-6, 150.0]])
