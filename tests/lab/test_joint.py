@@ -828,3 +828,78 @@ def test_roots_keep_their_half_plane(damping, expected):
     roots = Roots((10.0 / (2.0 * math.pi),), (damping,))
     assert_allclose(np.sort_complex(roots.values), np.sort_complex(np.array(expected, dtype=complex)), rtol=1e-12)
     assert Roots.of(roots.values).dampings == pytest.approx(roots.dampings)
+
+
+def asked_of_fit_plant(monkeypatch, recordings, name, **words):
+    """A joint fit whose search ends where it begins, and what it was asked for."""
+    asked = {}
+
+    def kept(structure, records, **given):
+        values = np.array([p.start for p in structure.parameters])
+        asked.update(given, records=records)
+        left = tuple(np.full((r.output.shape[0] - r.first, 1), 1e-6 * (k + 1)) for k, r in enumerate(records))
+        return SimpleNamespace(values=values, residuals=left, mirror=structure.build(values))
+
+    monkeypatch.setattr(joint, "fit_plant", kept)
+    return fit_joint(recordings, name, UNITS, **words), asked
+
+
+def loops_of(*sizes):
+    """Loops of unlike length, rate and first drive value."""
+    drives = [4.0 + 3.0 * k + 3.0 * np.sin(np.arange(n) / 20.0) for k, n in enumerate(sizes)]
+    return [recorded(d, 7e-5 * d, 500.0 * (k + 1), name=f"l{k}") for k, d in enumerate(drives)]
+
+
+STATIC_FIT = SimpleNamespace(model=BoucWen(*EQ3, rate_limit_v_s=90.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "rates", "free"),
+    [
+        ("bouc_wen_creep", True, ["d2", "delta"]),
+        ("bouc_wen_asymmetric", True, ["d2", "delta", "gamma over alpha", "eta over alpha"]),
+        ("bouc_wen_classical", False, ["exponent"]),
+    ],
+)
+@pytest.mark.parametrize("admissible", [False, True])
+def test_a_joint_fit_of_eq_3_begins_at_its_static_fit_about_the_mean_of_the_first_drives(
+    monkeypatch, name, rates, free, admissible
+):
+    words = {"static": STATIC_FIT, "admissible": admissible, "starts": 3, "seed": 4}
+    fit, asked = asked_of_fit_plant(monkeypatch, loops_of(900, 1400), name, **words)
+    creep_on = name.endswith("creep")
+    epsilon = "epsilon over its limit" if admissible else "epsilon"
+    names = [p.name for p in fit.structure.parameters]
+    assert names[: 4 + len(free)] == ["d1", epsilon, "alpha", "beta over alpha", *free]
+    assert fit.model.bias_v == pytest.approx(5.5)
+    assert fit.model.rate_limit_v_s == fit.rate_limit_v_per_s == 90.0
+    assert (fit.model.d2_s_v, fit.model.delta_s_v) == ((1e-5, 4e-3) if rates else (0.0, 0.0))
+    assert fit.creep == (Creep((8e-8,) * 3, (0.01, 0.1, 1.0)) if creep_on else Creep())
+    assert len(asked["starts"]) == 2 and asked["tolerance"] == 1e-9 and asked["most_evaluations"] == 200
+    assert [r.name for r in asked["records"]] == ["l0", "l1"] == [r.name for r in asked["screen"]]
+    assert {r.hold for r in asked["records"]} == {"first-order"}  # nothing lags behind the hysteresis
+    used = [len(r.output) - r.first for r in asked["records"]]
+    rms = 1e-6 * math.sqrt((used[0] + 4 * used[1]) / sum(used))
+    assert fit.residual_rms_rad == pytest.approx(rms) and fit.samples_used == sum(used)
+    assert (fit.linear, fit.delay_s, fit.hold, fit.begun) == (None, 0.0, "first-order", False)
+
+
+def test_recordings_of_the_linear_part_belong_to_a_fit_of_it_and_two_of_their_periods_say_all(monkeypatch):
+    drive = small_multisine(period=300, periods=5)
+    wide = [recorded(drive, 7e-5 * drive, name=name, period=n) for name, n in (("periodic", 300), ("chirp", None))]
+    words = {"linear": RESONANCE, "free_linear": True, "broadband": wide, "hold": "zero-order", "evaluations": 7}
+    fit, asked = asked_of_fit_plant(monkeypatch, loops_of(900, 1400), "bouc_wen_joint", static=STATIC_FIT, **words)
+    runs = asked["records"]
+    assert [(r.name, len(r.output), r.step_s) for r in runs] == [
+        *(("l0", 900, 2e-3), ("l1", 1400, 1e-3)),
+        *(("periodic", 600, 1e-3), ("chirp", 1500, 1e-3)),
+    ]
+    assert {r.hold for r in runs} == {"zero-order"} and asked["screen"] == ()
+    assert (asked["tolerance"], asked["most_evaluations"]) == (1e-10, 7)
+    assert fit.samples_used == sum(len(r.output) - r.first for r in runs[:2]) and fit.linear == RESONANCE
+    assert [p.name for p in fit.structure.parameters][-3:] == ["pole 1", "pole 1 damping", "delay"]
+    held, asked = asked_of_fit_plant(
+        monkeypatch, loops_of(900), "bouc_wen_joint", static=STATIC_FIT, linear=RESONANCE, begin=fit
+    )
+    assert held.begun and held.model == fit.model and asked["starts"] == ()
+    assert [p.name for p in held.structure.parameters][-1] == "delta" and held.hold == "zero-order"

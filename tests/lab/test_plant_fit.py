@@ -3,6 +3,7 @@
 import pickle
 from dataclasses import astuple, replace
 from math import pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -792,3 +793,59 @@ def test_a_number_at_its_bound_or_with_a_large_error_is_told_with_its_unit(value
 def test_an_operator_becomes_no_play_that_no_sample_sees_bend(admissible):
     alpha = structures._bouc_wen_part(MODEL, (), admissible)[0][2]
     assert (alpha.name, alpha.lower, alpha.upper) == ("alpha", pytest.approx(5e-4), pytest.approx(15.0))
+
+
+@pytest.mark.parametrize("free_linear", [True, False])
+@pytest.mark.parametrize("admissible", [True, False])
+def test_an_axis_for_another_process_is_the_same_axis(free_linear, admissible):
+    """What is free, what is held and what is bounded goes with it."""
+    linear = LinearPoles(Roots((80.0, 30.0), (0.2, 1.0)), Roots((60.0,), (1.0,)), 3.0, 6e-4, 1e-4)
+    words = {"linear": linear, "creep": Creep((1e-6, 2e-6), (0.1, 2.5)), "free": ("delta", "eta")}
+    axis = structures.one_axis("own", MODEL, **words, free_linear=free_linear, admissible=admissible)
+    again = pickle.loads(pickle.dumps(axis))
+    assert again.parameters == axis.parameters and again.name == "own"
+    assert len(axis.parameters) == 6 + 2 + 5 * free_linear
+    assert (axis.parameters[1].name == "epsilon over its limit") is admissible
+    values = np.array([1.01 * p.start for p in axis.parameters])
+    assert again.parts(values) == axis.parts(values) and again.late(values) == axis.late(values)
+    assert [number for number, _ in again.beside] == [6, 7]
+
+
+def test_a_search_goes_on_from_the_best_of_its_starts_wherever_that_stands(monkeypatch):
+    """Three starts of which the second is the best, on fewer samples first; steps are counted of the searches since."""
+    asked = []
+
+    def search(problem, start, tolerance, most, *, central):
+        asked.append((problem.name, start.tolist(), tolerance, most, central))
+        at = float(start[0])
+        return SimpleNamespace(x=start + 0.5, cost=abs(at - 2.0), nfev=len(asked))
+
+    made = []
+    monkeypatch.setattr(plant_fit, "_search", search)
+    monkeypatch.setattr(
+        plant_fit,
+        "PlantProblem",
+        lambda structure, records: SimpleNamespace(name=records, scale=np.array([2.0]), size=10, far=1.0),
+    )
+    monkeypatch.setattr(plant_fit, "_report", lambda problem, best, costs: made.append((problem.name, best, costs)))
+    structure = SimpleNamespace(parameters=[SimpleNamespace(start=10.0)], name="of one")
+    told = []
+    for screen in ("few", ()):
+        asked.clear()
+        plant_fit.fit_plant(
+            structure,
+            "all",
+            screen=screen,
+            starts=[np.array([5.0]), np.array([12.0])],
+            tolerance=1e-11,
+            most_evaluations=20,
+            on_progress=lambda *args: told.append(args),
+        )
+        ending, first = (1e-5, "few") if screen else (1e-8, "all")
+        assert asked[:3] == [(first, [at], ending, 20, False) for at in (5.0, 2.5, 6.0)]
+        on = [("all", [3.0], 1e-8, 20, False), ("all", [3.5], 1e-11, 16, True)] if screen else []
+        assert asked[3:] == (on or [("all", [3.0], 1e-11, 18, True)])
+        name, best, costs = made.pop()
+        assert (name, costs) == ("all", [3.0, 0.5, 4.0])
+        assert best.nfev == (5 + 4 if screen else 4 + 2)
+    assert told == [(1, 3, "of one"), (2, 3, "of one"), (3, 3, "of one")] * 2
