@@ -912,3 +912,49 @@ def test_errors_of_gain_and_phase_and_of_poles_are_those_of_differences():
     assert slow.freq_error_hz == pytest.approx(np.hypot(20 * size[1], 30 * size[2]) / np.hypot(20, 30) / (2 * np.pi))
     assert fit.known.delay_error_s == pytest.approx(size[-1])
     assert fit.poles_rad_s.tolist() == [-60, -20 + 30j, -20 - 30j] and fit.zeros_rad_s.size == 0
+
+
+def test_zeros_without_a_rate_are_known_up_to_ten_times_the_highest_frequency():
+    table = anti_resonances()
+    fit = fit_frequency_response(table.freq_hz, table.true_response, table.order)
+    highest = np.abs(fit.known.zeros_rad_s).max()
+    for share, kept in ((9.9, True), (10.1, False)):
+        top = highest / (2 * np.pi) / share
+        known = replace(fit, freq_hz=fit.freq_hz * top / fit.freq_hz[-1]).known
+        assert bool(np.isclose(np.abs(known.zeros_rad_s), highest).any()) is kept
+
+
+@pytest.mark.parametrize("delayed", [True, False])
+@pytest.mark.parametrize("proper", [True, False])
+def test_errors_of_a_model_with_or_without_direct_term_and_delay_are_those_of_its_numbers(proper, delayed):
+    """Two outputs and one drive, a real pole and a pair."""
+    draw = np.random.Generator(np.random.Philox(8)).standard_normal
+    poles = np.array([-60.0 + 0j, -20 + 30j])
+    vectors = np.array([[1.0], [1 + 2j]]), np.array([[30.0, 5 - 2j], [7.0, 1 + 4j]])
+    direct = np.zeros((2, 1)) if proper else np.array([[0.5], [1.0]])
+    model = ModalModel(poles, *vectors, direct, 0.01 * delayed)
+    numbers = pack(model, not proper)
+    count = numbers.size + delayed
+    root = 1e-3 * draw((count + 4, count)) * np.append(np.maximum(np.abs(numbers), 1.0), 0.1)[:count]
+    freq = np.array([0.0, 0.5, 9.0])
+    words = {"system": model.state_space(), "modes": model, "order": 3, "hold": "band-limited", "rate_hz": None}
+    words |= {"freq_hz": freq, "table": model.response(freq), "scan": (), "reason": "", "normal": None, "variance": 1.0}
+    fit = frequency_fit.FrequencyResponseFit(**words, errors_from="", chi_square=None, strictly_proper=proper)
+    covariance = root.T @ root
+    vars(fit)["covariance"] = covariance
+    size = np.sqrt(np.diag(covariance))
+    assert fit.known.delay_error_s == pytest.approx(size[-1] if delayed else 0.0)
+    pair = np.hypot(size[1], size[2])
+    np.testing.assert_allclose(fit.known.poles_error_rad_s, [size[0], pair, pair])
+
+    def gains(v):
+        at = 2j * np.pi * np.array([0.0, 0.5])  # at rest, and at the lowest frequency above
+        values = transfer_matrix(unpack(v, model), at)[:, :, 0]
+        return np.concatenate([values[0].real, np.abs(values[1])])
+
+    jacobian = central_differences(gains, numbers, 1e-6 * np.maximum(np.abs(numbers), 0.01))
+    own = covariance[: numbers.size, : numbers.size]
+    errors = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, own, jacobian))
+    np.testing.assert_allclose(
+        np.concatenate([fit.known.dc_gain_error, fit.known.edge_gain_error])[:, 0], errors, rtol=1e-4
+    )

@@ -1684,3 +1684,64 @@ def test_many_samples_of_several_records_are_thinned_alike_to_twelve_thousand():
     assert (thin.share, thin.rate_limit) == (0.5, 250.0)
     few = bouc_wen_of.BoucWenProblem((records[2],), 0.5, 250.0)
     assert bouc_wen_of._thin_problem(few) is few
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_mirror_file_of_a_model_that_was_not_chosen_has_the_score_and_the_warnings_of_that_model(turned):
+    """Of plays and Eq. 3 one falls with the drive, the chosen one or the other."""
+    sign = 1 if turned else -1
+    plays_fit = PrandtlIshlinskiiFit(
+        thresholds_v=np.array([0.0, 1.5]),
+        weights_rad_per_v=np.array([2e-4, 5e-5]),
+        standard_errors_rad_per_v=np.array([np.nan, np.nan]),
+        sign=sign,
+        offsets_rad=(0.0,),
+        rate_limit_v_per_s=432.1,
+        units=Units(),
+        colour_inflation=1.0,
+        condition_number=1.0,
+        residual_rms_percent=0.1,
+        samples_used=1300,
+    )
+    eq_3 = BoucWenFit(
+        model=BoucWen(-8e-5 * sign, 3e-7, 4e-5 * sign, 5e-4, 40.0, 30.0, 777.0),
+        offsets_rad=(0.0,),
+        units=Units(),
+        covariance=np.zeros((6, 6)),
+        colour_inflation=1.0,
+        condition_number=1.0,
+        not_identified=(),
+        residual_rms_percent=0.1,
+        start_rms_percent=(0.1,),
+        agreeing_starts=1,
+        slope_after_reversal_rad_per_v=1e-6,
+        lowest_slope_rad_per_v=1e-6,
+        admissible=True,
+        constrained=False,
+        samples_used=987,
+    )
+    scores = (
+        predictions.Score("prandtl_ishlinskii", 0.1, 1.0, 0.5, 5.0),
+        predictions.Score("bouc_wen", 0.2, 2.0, 0.7, 7.0),
+    )
+    general = ("one.", "two.")
+    both = static_identification(
+        plays_fit,
+        fits=(plays_fit, eq_3),
+        scores=scores,
+        warnings=general if turned else (*general, _FLIPPED),
+        recordings=[],
+        predictions=((),),
+    )
+    lines = mirror_file_text(both, "m", model="bouc_wen").split("\n")
+    assert lines[0] == "# Mirror identified from 4 recording(s), model bouc_wen."
+    assert lines[9:14] == [
+        "# 987 samples used, behind the initial transient of each recording.",
+        "# Residual in % of the peak-to-peak output, rms (peak):",
+        "#   bouc_wen: 0.200 (2.00) on the fitted samples, 0.700 (7.00) on the held-out samples",
+        "#   straight line: 2.346 (6.70) on the fitted samples, 3.457 (8.90) on the held-out samples",
+        "# Choice: it is the best.",
+    ]
+    warned = [line for line in lines if line.startswith("# Warning")]
+    assert warned == [f"# Warning: {w}" for w in (*general, *([_FLIPPED] if turned else []))]
+    assert 'rate_limit = "777.0 V/s"' in "\n".join(lines) and "[uncertainty]" not in lines

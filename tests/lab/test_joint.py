@@ -898,8 +898,16 @@ def test_recordings_of_the_linear_part_belong_to_a_fit_of_it_and_two_of_their_pe
     assert (asked["tolerance"], asked["most_evaluations"]) == (1e-10, 7)
     assert fit.samples_used == sum(len(r.output) - r.first for r in runs[:2]) and fit.linear == RESONANCE
     assert [p.name for p in fit.structure.parameters][-3:] == ["pole 1", "pole 1 damping", "delay"]
-    held, asked = asked_of_fit_plant(
-        monkeypatch, loops_of(900), "bouc_wen_joint", static=STATIC_FIT, linear=RESONANCE, begin=fit
-    )
-    assert held.begun and held.model == fit.model and asked["starts"] == ()
-    assert [p.name for p in held.structure.parameters][-1] == "delta" and held.hold == "zero-order"
+
+
+def test_a_joint_fit_that_begins_at_another_of_its_form_scatters_no_starts_and_weighs_by_what_that_leaves(monkeypatch):
+    model = BoucWen(*EQ3, rate_limit_v_s=55.0)
+    begin = SimpleNamespace(model=model, creep=Creep((2e-7, 3e-7, 4e-7), (0.01, 0.1, 1.0)))
+    weigh = []
+    monkeypatch.setattr(joint, "_weighed", lambda structure, runs: weigh.append(structure) or runs[::-1])
+    words = {"linear": RESONANCE, "begin": begin, "hold": "first-order"}
+    fit, asked = asked_of_fit_plant(monkeypatch, loops_of(900, 1400), "bouc_wen_creep", **words)
+    assert fit.begun and fit.model == model and fit.creep == begin.creep and fit.rate_limit_v_per_s == 55.0
+    assert asked["starts"] == () and weigh == [fit.structure]
+    assert [r.name for r in asked["records"]] == ["l1", "l0"]
+    assert fit.linear is RESONANCE and [p.name for p in fit.structure.parameters][-1] == "creep at 1 s"

@@ -18,7 +18,7 @@ from microrad.lab.identify.linear.axis import fit_axis
 from microrad.lab.identify.linear.fit import OrderScore
 from microrad.lab.identify.linear.modal import late
 from microrad.lab.identify.linear.pole_zero import PoleZero, PoleZeroProblem, Root
-from microrad.lab.identify.linear.response import response_from_records
+from microrad.lab.identify.linear.response import response_from_periods, response_from_records
 from microrad.lab.identify.records import Units
 from microrad.lab.identify.selection.candidates import _fewer_poles, _without_spare_poles
 from microrad.lab.recording import recording_from_arrays
@@ -728,3 +728,28 @@ def test_of_zeros_beside_a_pole_one_of_its_own_kind_goes_with_it():
     assert real.zeros.frequencies_hz == (100.0, 99.0, 102.0)
     assert pair.zeros.frequencies_hz == (101.0, 99.0, 102.0)
     assert real.delay_s == pair.delay_s == 1e-4
+@pytest.mark.parametrize(("period", "length_s"), [(50, 0.1), (None, 0.4)])
+def test_a_pole_is_shown_by_a_period_of_what_repeats_and_else_by_a_whole_record(monkeypatch, period, length_s):
+    """Two records of 200 samples at 500 Hz, and what the problem of their poles is made of."""
+
+    class Made(Exception):
+        pass
+
+    def made(*given):
+        raise Made(*given)
+
+    monkeypatch.setattr(axis, "PoleZeroProblem", made)
+    drives = [philox(k).standard_normal((period or 200, 1)) for k in (1, 2)]
+    records = []
+    for drive in drives:
+        whole = np.tile(drive, (200 // len(drive), 1))
+        record = recording_from_arrays(whole, whole, 500.0)
+        records.append(replace(record, output=whole + 0.1 * np.roll(whole, 1, axis=0), period_samples=period))
+    with pytest.raises(Made) as caught:
+        fit_axis(records, hold="first-order")
+    response, lags, length = caught.value.args
+    expected = response_from_periods(records) if period else response_from_records(records, bands=500)
+    assert length == pytest.approx(length_s) and response.hold == "first-order"
+    assert lags == axis._lags(expected)
+    assert_allclose(response.freq_hz, expected.freq_hz)
+    assert_allclose(response.response, expected.response)
