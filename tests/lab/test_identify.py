@@ -1745,3 +1745,37 @@ def test_a_mirror_file_of_a_model_that_was_not_chosen_has_the_score_and_the_warn
     warned = [line for line in lines if line.startswith("# Warning")]
     assert warned == [f"# Warning: {w}" for w in (*general, *([_FLIPPED] if turned else []))]
     assert 'rate_limit = "777.0 V/s"' in "\n".join(lines) and "[uncertainty]" not in lines
+
+
+def test_what_is_said_of_a_fit_of_eq_3_counts_both_records_and_what_each_adds_by_itself():
+    problem = problem_of(rate_limit=250.0)
+    values = np.array([1e-4, 2e-4, -2e-5, 3e-3, 1.5, 0.4])
+    costs = np.array([3.0, 2.0, 2.0015, 2.01])
+    fit = bouc_wen_of._report(problem, values, Units("mV", "mrad"), costs, False)
+    row = np.array([*values, 250.0, 0.0])
+
+    def modelled(at):
+        given = np.array([*at, 250.0, 0.0])
+        return [bouc_wen_response(r.drive_v, r.step_s, given, 0.0)[0][r.start :] for r in problem.records]
+
+    left = [r.output_rad[r.start :] - own for r, own in zip(problem.records, modelled(row[:6]), strict=True)]
+    assert_allclose(fit.offsets_rad, [part.mean() for part in left])
+    rest = centred(np.concatenate(left), problem.records)
+    parts = np.split(rest, [285])
+    assert fit.samples_used == rest.size == 285 + 190
+    largest = max(np.ptp(r.output_rad[r.start :]) for r in problem.records)
+    assert fit.residual_rms_percent == pytest.approx(100 * np.sqrt(np.mean(rest**2)) / largest, rel=1e-9)
+    assert fit.colour_inflation == pytest.approx(colour_inflation(parts))
+    steps = np.diag(1e-5 * np.abs(values))
+    ahead, behind = ([np.concatenate(modelled(values + way * s)) for s in steps] for way in (1.0, -1.0))
+    jacobian = centred((np.array(ahead) - np.array(behind)).T / (2 * np.diag(steps)), problem.records)
+    size = np.linalg.norm(jacobian, axis=0)
+    free = rest.size - 6 - sum(r.own_count for r in problem.records)
+    inverse = np.linalg.inv((jacobian / size).T @ (jacobian / size)) / np.outer(size, size)
+    expected = fit.colour_inflation * (rest @ rest) / free * inverse
+    assert_allclose(np.diag(fit.covariance), np.diag(expected), rtol=1e-4)  # of differences with steps of their own
+    assert fit.model == BoucWen(*values.tolist(), 250.0) and fit.units == Units("mV", "mrad")
+    assert_allclose(fit.start_rms_percent, 100 * np.sqrt(2 * costs))
+    assert fit.agreeing_starts == 2 and fit.constrained is False and fit.name == "bouc_wen"
+    assert fit.slope_after_reversal_rad_per_v == pytest.approx(1e-4 - 2e-5 * 2 * 1.5 / 1.1)
+    assert fit.lowest_slope_rad_per_v == pytest.approx(bouc_wen_of.lowest_slope(problem, values))

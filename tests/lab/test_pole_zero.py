@@ -732,11 +732,11 @@ def test_of_zeros_beside_a_pole_one_of_its_own_kind_goes_with_it():
 def test_a_pole_is_shown_by_a_period_of_what_repeats_and_else_by_a_whole_record(monkeypatch, period, length_s):
     """Two records of 200 samples at 500 Hz, and what the problem of their poles is made of."""
 
-    class Made(Exception):
+    class MadeError(Exception):
         pass
 
     def made(*given):
-        raise Made(*given)
+        raise MadeError(*given)
 
     monkeypatch.setattr(axis, "PoleZeroProblem", made)
     drives = [philox(k).standard_normal((period or 200, 1)) for k in (1, 2)]
@@ -745,7 +745,7 @@ def test_a_pole_is_shown_by_a_period_of_what_repeats_and_else_by_a_whole_record(
         whole = np.tile(drive, (200 // len(drive), 1))
         record = recording_from_arrays(whole, whole, 500.0)
         records.append(replace(record, output=whole + 0.1 * np.roll(whole, 1, axis=0), period_samples=period))
-    with pytest.raises(Made) as caught:
+    with pytest.raises(MadeError) as caught:
         fit_axis(records, hold="first-order")
     response, lags, length = caught.value.args
     expected = response_from_periods(records) if period else response_from_records(records, bands=500)

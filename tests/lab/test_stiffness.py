@@ -1516,3 +1516,29 @@ def test_periods_to_be_skipped_are_none_or_more(known):
     record = record_of(hysteretic_truth(), 0.9, 78)
     with pytest.raises(IdentificationError, match=r"^-1 periods are to be skipped; skip none or more\.$"):
         fit_of._check([record], -1, StiffnessOptions())
+
+
+def test_a_fit_is_trusted_by_the_operator_that_goes_farthest_beyond_its_own_motion_and_by_both_amplitudes():
+    """Two operators on two drives, and errors that rise as the square of the amplitude: 2 and 8 um at 0.5 and 1 V."""
+    plays = tuple(PrandtlIshlinskii((0.0, 0.5), (w, w / 2)) for w in (1.0, 3.0))
+    none = np.zeros((0, 0))
+    own = Mirror(
+        *("two", none, np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((2, 0)), np.eye(2)),
+        *(np.zeros((1, 0)), np.zeros((1, 2)), np.ones((1, 2)), (), plays, ()),
+    )
+    fit = SimpleNamespace(
+        mirror=own,
+        classes=(1, 0, 1, 0, 0),
+        amplitudes=(0.5, 1.0),
+        error_rms=1e-6 * np.array([4.0, 2.0, np.sqrt(112.0), 1.0, np.sqrt(7.0)]),
+        rate_hz=100.0,
+        sub_steps=2,
+        delay_s=0.0,
+        motion=np.array([4.0, 0.5]),
+    )
+    turn = 2 * np.pi * np.arange(64) / 64
+    drive = np.column_stack([3.0 * np.sin(turn), 0.75 * np.sin(2 * turn)])
+    found = trust(fit, drive)
+    assert found.motion == pytest.approx(1.5, rel=1e-6)  # of the second: 0.75 V, where 0.5 V were recorded
+    mean_square = (3.0**2 + 0.75**2) / 4
+    assert found.left == found.error_rms == pytest.approx(8e-6 * mean_square, rel=1e-9) and found.open == 0.0
