@@ -1421,3 +1421,47 @@ def test_what_is_known_of_each_output_is_what_its_own_drive_and_records_say():
     assert names == [
         name for k, (o, i) in enumerate(pairs, 1) for name in (f"modes.decay.{k}", f"matrices.D.{o + 1}.{i + 1}")
     ]
+
+
+def test_recordings_for_validation_are_checked_with_the_others_and_wiring_by_those_that_are_fitted(monkeypatch):
+    """The second of two for validation moves farther than a mirror can; the third recording is held out."""
+    asked = []
+    monkeypatch.setattr(ladder, "check_travel", lambda *args, **words: asked.append((args, words)))
+    monkeypatch.setattr(ladder, "check_together", lambda *args: asked.append(args))
+
+    class WiredError(Exception):
+        pass
+
+    def wired(*args):
+        raise WiredError(*args)
+
+    monkeypatch.setattr(ladder, "check_wiring", wired)
+    names = "abcvw"
+    given = [drawn_at_random(name, 128, seed=k, period=32) for k, name in enumerate(names)]
+    words = {"drive_unit": "mV", "output_unit": "um", "positions_m": ((0.0, 0.01), (0.02, 0.0))}
+    signs = ((1, 0), (0, -1))
+    for validation in ((), given[3:]):
+        asked.clear()
+        with pytest.raises(WiredError) as caught:
+            identify_coupled(given[:3], validation=validation, signs=signs, **words)
+        (travelled, of), together = asked
+        assert [r.path for r in travelled[0]] == list("abc" if not validation else names)
+        assert travelled[1:] == ("um",) and of == {"positions_m": words["positions_m"]}
+        assert together == (given[:3], validation)
+        path, response, outputs, told = caught.value.args
+        fitted = given[: 3 if validation else 2]
+        assert (path, told) == ("a", signs)
+        assert [output.position_m for output in outputs] == [(0.0, 0.01), (0.02, 0.0)]
+        expected = response_from_periods(fitted).response * 1e-6 / 1e-3
+        np.testing.assert_allclose(response.response, expected)
+
+
+def test_recordings_for_validation_have_the_rate_and_the_channels_of_the_others():
+    fitted = [drawn_at_random(name, 128, seed=k, period=32) for k, name in enumerate("abc")]
+    for other, words in (
+        (replace(fitted[0], path="v", rate_hz=77.0), "v: the sample rate is 77 Hz and that of a "),
+        (replace(fitted[0], path="v", output=fitted[0].output[:, :1]), "v: 2 inputs and 1 output, where a has 2 and 2"),
+    ):
+        with pytest.raises(IdentificationError) as refused:
+            channels(fitted, [fitted[1], other], "V", "m", None)
+        assert str(refused.value).startswith(words)

@@ -1542,3 +1542,49 @@ def test_a_fit_is_trusted_by_the_operator_that_goes_farthest_beyond_its_own_moti
     assert found.motion == pytest.approx(1.5, rel=1e-6)  # of the second: 0.75 V, where 0.5 V were recorded
     mean_square = (3.0**2 + 0.75**2) / 4
     assert found.left == found.error_rms == pytest.approx(8e-6 * mean_square, rel=1e-9) and found.open == 0.0
+
+
+@pytest.mark.parametrize("given", [True, False])
+@pytest.mark.parametrize("delay_s", [None, 2e-4])
+def test_springs_begin_with_the_records_of_the_largest_and_of_the_middle_amplitude_in_any_order(
+    monkeypatch, given, delay_s
+):
+    """Seven records of three amplitudes; the first period of each output is none of its steady state."""
+    sizes = {"a": 3.0, "b": 1.0, "c": 9.0, "d": 3.0, "e": 1.0, "f": 9.0, "g": 3.0}
+    records = []
+    for k, (name, size) in enumerate(sizes.items()):
+        one = np.random.Generator(np.random.Philox(k)).standard_normal((32, 1))
+        drive = size * np.tile(one / one.std(), (3, 1))
+        output = 1e-6 * np.roll(drive, k, axis=0) + np.where(np.arange(96) < 32, 1e-4, 0.0)[:, None]
+        records.append(Recording(name, "", drive, output, 400.0, ("u",), ("y",), 32))
+    model = ModalModel(np.array([-9.0 + 40j]), np.ones((1, 1)) + 0j, np.ones((1, 1)) + 0j, np.ones((1, 1)))
+    asked = []
+
+    class BegunError(Exception):
+        pass
+
+    def begin(*args, **words):
+        raise BegunError(*args, words)
+
+    monkeypatch.setattr(fit_of, "linear_start", lambda *args: asked.append(args) or LinearStart(model, 1e-4))
+    monkeypatch.setattr(springs_of, "begin", begin)
+    options = StiffnessOptions(springs=3, thresholds=(0.1, 0.3), sub_steps=4, delay_s=delay_s, exchanges=5)
+    words = {"start": LinearStart(model, 3e-4)} if given else {}
+    with pytest.raises(BegunError) as caught:
+        fit_hysteretic_stiffness(records, order=6, options=options, skip_periods=1, **words)
+    linear, largest, middle, *rest = caught.value.args
+    assert rest == [3, (0.1, 0.3), {"fixed_delay": delay_s is not None}]
+    assert [r.name for r in largest] == ["c", "f"] and [r.name for r in middle] == ["a", "d", "g"]
+    drive, output = (np.sqrt(np.mean([np.var(getattr(r, of)) for r in records])) for of in ("drive", "output"))
+    for steady, record in zip(largest, (records[2], records[5]), strict=True):
+        np.testing.assert_allclose(steady.drive, record.drive[32:64] / drive)
+        np.testing.assert_allclose(steady.output, (record.output[32:64] - record.output[32:64].mean()) / output)
+        assert (steady.rate_hz, steady.sub_steps) == (400.0, 4)
+    np.testing.assert_allclose(linear.model.direct, [[drive / output]])
+    assert linear.delay_s == (3e-4 if given else 1e-4) and len(asked) == (not given)
+    if not given:
+        response, *others = asked[0]
+        assert others == [6, 4, delay_s, 5]
+        expected = response_from_periods([records[k] for k in (0, 3, 6)], skip_periods=1)
+        np.testing.assert_allclose(response.response, expected.response)
+        np.testing.assert_allclose(response.standard_error, expected.standard_error)
