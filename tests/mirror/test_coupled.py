@@ -1074,3 +1074,38 @@ def test_numbers_of_elements_that_all_change_places_stay_with_their_elements():
         *("hysteresis.2.widening", "hysteresis.3.polynomial.3", "hysteresis.1.epsilon"),
         *("matrices.E.2.2", "matrices.K.1.3", "matrices.G.1.1"),
     )
+
+
+def test_channels_and_elements_are_counted_by_their_numbers_wherever_they_stand_in_a_file():
+    """Eleven plays and three outputs, in a file that begins with the last: the tenth comes behind the ninth."""
+    own = handmade()
+    plays = tuple(PrandtlIshlinskii((0.0, 1.0 + k), (0.1 + k, 0.01)) for k in range(11))
+    plant = replace(
+        own.mirror,
+        E=np.arange(33.0).reshape(3, 11) / 100,
+        F=np.zeros((11, 3)),
+        G=np.arange(22.0).reshape(11, 2),
+        C=np.arange(9.0).reshape(3, 3),
+        D=np.arange(6.0).reshape(3, 2),
+        K=np.arange(33.0).reshape(3, 11),
+        bouc_wen=(),
+        plays=plays,
+    )
+    outputs = tuple(Output(f"y{k}", "displacement", (0.01 * (k == 1), 0.02 * (k == 2))) for k in range(3))
+    mirror = replace(own, mirror=plant, outputs=outputs)
+    text = coupled.text(mirror)
+    head, *tables = text.split("\n[")
+    turned = "\n[".join([head, *reversed(tables)])
+    assert turned.index("[hysteresis.11]") < turned.index("[hysteresis.10]") < turned.index("[hysteresis.9]")
+    assert turned.index("[actuators.2]") < turned.index("[actuators.1]")
+    found = coupled.of(load_coupled_mirror("mirror.toml", text=turned))
+    assert found.mirror.plays == plays
+    assert [actuator.name for actuator in found.actuators] == ["left", "right"] and found.outputs == outputs
+    for name in "ABEGCDK":
+        np.testing.assert_array_equal(getattr(found.mirror, name), getattr(plant, name))
+
+
+def test_a_comment_stays_a_comment_whatever_it_holds():
+    text = coupled.text(handmade(), ['of "a"\nname = "other"', "", "tab\tand \x85 end"])
+    assert text.startswith('# of "a" name = "other"\n# \n# tab and   end\n# Matrices, weights')
+    assert load_coupled_mirror("mirror.toml", text=text).name == "by hand"
