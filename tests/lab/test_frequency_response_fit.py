@@ -958,3 +958,35 @@ def test_errors_of_a_model_with_or_without_direct_term_and_delay_are_those_of_it
     np.testing.assert_allclose(
         np.concatenate([fit.known.dc_gain_error, fit.known.edge_gain_error])[:, 0], errors, rtol=1e-4
     )
+
+
+@pytest.mark.parametrize("alike", [True, False])
+@pytest.mark.parametrize("proper", [True, False])
+def test_a_start_whose_sums_are_singular_is_that_of_a_vector_fit_with_the_weight_of_each_element(
+    monkeypatch, alike, proper
+):
+    """A table of two outputs and three drives behind a hold, with errors of its own in each element or a factor."""
+
+    def singular(*args, **words):
+        raise np.linalg.LinAlgError("the sums are singular")
+
+    monkeypatch.setattr(frequency_fit, "sketched", singular)
+    draw = np.random.Generator(np.random.Philox(3)).standard_normal
+    freq = np.arange(1.0, 41.0)
+    true = ModalModel(
+        np.array([-60.0 + 0j, -20 + 90j]),
+        np.array([[1.0, -2.0, 0.5], [1 + 2j, 1.0, -1j]]),
+        np.array([[30.0, 5 - 2j], [7.0, 1 + 4j]]),
+        np.ones((2, 3)) * (not proper),
+    )
+    response = true.response(freq, "first-order", 200.0) + 0.03 * (draw((40, 2, 3)) + 1j * draw((40, 2, 3)))
+    error = np.exp(draw((1, 2, 3)) + 0.2 * draw((40, 1, 1)) + (not alike) * 0.3 * draw((40, 2, 3)))
+    table = response_table.checked(freq, response, error, ("first-order", 200.0, proper))
+    equations = table.equations()
+    assert (len(equations.squared) == 1) is alike
+    found = frequency_fit._sketch(table, equations.response, equations, 3)
+    words = {"weight": np.sqrt(2.0) / error, "hold": "first-order", "rate_hz": 200.0, "strictly_proper": proper}
+    expected = vector_fit(freq, equations.response, 3, **words)
+    np.testing.assert_allclose(found.poles_rad_s, expected.poles_rad_s, rtol=1e-3)  # both end within a millionth
+    np.testing.assert_allclose(found.residues, expected.residues, rtol=1e-2, atol=1e-2)
+    assert found.rms_error == pytest.approx(expected.rms_error, rel=1e-5) and found.direct.any() == (not proper)

@@ -26,6 +26,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     upsampled,
 )
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, hysteretic_oscillator, one_axis, poles_of
+from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import Recording, read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
@@ -849,3 +850,42 @@ def test_a_search_goes_on_from_the_best_of_its_starts_wherever_that_stands(monke
         assert (name, costs) == ("all", [3.0, 0.5, 4.0])
         assert best.nfev == (5 + 4 if screen else 4 + 2)
     assert told == [(1, 3, "of one"), (2, 3, "of one"), (3, 3, "of one")] * 2
+
+
+def test_what_a_search_leaves_is_told_of_each_run_in_the_units_of_its_recording(monkeypatch):
+    """Two runs of two outputs with weights of their own, and four starts of which two ended alike."""
+    left = [philox(1).standard_normal((40, 2)) * [1.0, 3.0], np.cumsum(philox(2).standard_normal((30, 2)), axis=0)]
+    targets = [5.0 + philox(k).standard_normal(part.shape) for k, part in enumerate(left)]
+    runs = [SimpleNamespace(weight=w) for w in (2.0, 0.25)]
+    rows = [np.column_stack([part.ravel(), np.full((part.size, 2), k + 1.0)]) for k, part in enumerate(left)]
+    asked, cleared = [], []
+    problem = SimpleNamespace(
+        structure="structure",
+        scale=np.array([10.0, 0.5]),
+        runs=runs,
+        targets=targets,
+        edges=[80],
+        modelled=lambda x: np.concatenate(
+            [r.weight * (t - e).ravel() for r, t, e in zip(runs, targets, left, strict=True)]
+        ),
+        rows=lambda x, central: asked.append((x.tolist(), central)) or rows,
+        simulated=SimpleNamespace(cache_clear=lambda: cleared.append(True)),
+    )
+    monkeypatch.setattr(plant_fit, "_scatter", lambda of, given: ("scatter", of is problem, given is rows))
+    monkeypatch.setattr(plant_fit, "_covariance", lambda slopes, scatter, of: ((slopes, scatter), 123.0))
+    monkeypatch.setattr(
+        plant_fit, "_not_identified", lambda structure, values, covariance: [(structure, values.tolist())]
+    )
+    best = SimpleNamespace(x=np.array([0.3, 4.0]), nfev=17, status=0)
+    fit = plant_fit._report(problem, best, [3.0, 1.0, 1.0009, 1.0011])
+    assert fit.values.tolist() == [3.0, 2.0] and fit.not_identified == (("structure", [3.0, 2.0]),)
+    for found, part in zip(fit.residuals, left, strict=True):
+        assert_allclose(found, part, atol=1e-12)
+    assert_allclose(fit.residual_rms, [np.sqrt(np.mean(part**2, axis=0)) for part in left])
+    assert fit.colour_inflation == pytest.approx(colour_inflation(list(left[1].T)))  # what wanders has the more colour
+    assert fit.colour_inflation > colour_inflation(list(left[0].T))
+    (slopes, scatter), told = fit.covariance, asked
+    assert [part[0].tolist() for part in slopes] == [[1.0, 1.0], [2.0, 2.0]] and scatter == ("scatter", True, True)
+    assert told == [([0.3, 4.0], True)] and cleared == [True]
+    assert (fit.condition_number, fit.start_costs, fit.agreeing_starts) == (123.0, (3.0, 1.0, 1.0009, 1.0011), 2)
+    assert (fit.evaluations, fit.converged) == (17, False)
