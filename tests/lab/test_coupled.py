@@ -1465,3 +1465,42 @@ def test_recordings_for_validation_have_the_rate_and_the_channels_of_the_others(
         with pytest.raises(IdentificationError) as refused:
             channels(fitted, [fitted[1], other], "V", "m", None)
         assert str(refused.value).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("steps", "delays", "error"),
+    [
+        # half a sample at most a quarter at a time, either way, and none below 0; three tenths of an error end it
+        ([(5e-4, 1e-5), (-5e-4, 1e-5), (-2e-4, 1e-5), (2.9e-6, 1e-5)], [1e-4, 3.5e-4, 1e-4, 0.0], 1e-5),
+        ([(3.1e-6, 1e-5), (-2.9e-6, 1e-5)], [1e-4, 1.031e-4], 1e-5),
+        ([(0.0, 4e-6)], [1e-4], 4e-6),
+        ([(1e-5, 1e-6 * k) for k in range(1, 10)], [1e-4 + 1e-5 * k for k in range(9)], 9e-6),  # eight rounds
+    ],
+)
+def test_the_delay_of_a_linear_model_goes_on_by_its_own_steps_until_these_are_small(monkeypatch, steps, delays, error):
+    model = ModalModel(np.array([-20.0 + 90j]), np.ones((1, 1)) + 0j, np.ones((1, 1)) + 0j, np.ones((1, 1)))
+    asked, models, left = [], [], list(steps)
+
+    def behind(response, delay_s, step_count):
+        asked.append(delay_s)
+        return response, delay_s
+
+    def spread(given, response, delay_s, spectra):
+        step, size = left.pop(0)
+        models.append((given, response[1], delay_s, spectra))
+        return linear_errors.Spread(np.append(np.ones(7), size)[None, :], np.append(np.full(7, 9.0), step))
+
+    kept = replace(model)
+    monkeypatch.setattr(linear, "without_delay", behind)
+    monkeypatch.setattr(linear, "fit_order", lambda response, order, exchanges: SimpleNamespace(model=model))
+    monkeypatch.setattr(linear, "_equations", lambda response: response)
+    monkeypatch.setattr(linear, "polish", lambda equations, given, iterations: SimpleNamespace(model=kept))
+    monkeypatch.setattr(linear, "spread", spread)
+    found = linear.coupled_linear(table_of(np.ones((9, 1, 1)) + 0j, (1.0,)), 2, 1e-4, 5, "spectra")
+    assert asked == pytest.approx(delays, abs=1e-12) and left == []
+    assert [given is (model if k == 0 else kept) for k, (given, *_) in enumerate(models)] == [True] * len(delays)
+    for (_, response_s, delay_s, spectra), expected in zip(models, delays, strict=True):
+        assert response_s == delay_s == pytest.approx(expected, abs=1e-12) and spectra == "spectra"
+    assert found.delay_s == pytest.approx(delays[-1], abs=1e-12) and found.delay_error_s == pytest.approx(error)
+    assert found.modes is models[-1][0] and (found.order, found.parameters) == (2, 6)
+    assert found.poles_error_rad_s.tolist() == [1 + 1j] and found.known.parameters[-1] == "recording.delay"
