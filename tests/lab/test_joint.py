@@ -846,7 +846,7 @@ def asked_of_fit_plant(monkeypatch, recordings, name, **words):
 
 def loops_of(*sizes):
     """Loops of unlike length, rate and first drive value."""
-    drives = [4.0 + 3.0 * k + 3.0 * np.sin(np.arange(n) / 20.0) for k, n in enumerate(sizes)]
+    drives = [4.0 + 3.0 * k + (3.0 + 2.0 * k) * np.sin(np.arange(n) / 20.0) for k, n in enumerate(sizes)]
     return [recorded(d, 7e-5 * d, 500.0 * (k + 1), name=f"l{k}") for k, d in enumerate(drives)]
 
 
@@ -881,6 +881,7 @@ def test_a_joint_fit_of_eq_3_begins_at_its_static_fit_about_the_mean_of_the_firs
     used = [len(r.output) - r.first for r in asked["records"]]
     rms = 1e-6 * math.sqrt((used[0] + 4 * used[1]) / sum(used))
     assert fit.residual_rms_rad == pytest.approx(rms) and fit.samples_used == sum(used)
+    assert fit.residual_rms_percent == pytest.approx(100 * rms / max(np.ptp(r.output) for r in asked["records"]))
     assert (fit.linear, fit.delay_s, fit.hold, fit.begun) == (None, 0.0, "first-order", False)
 
 

@@ -1109,3 +1109,14 @@ def test_a_comment_stays_a_comment_whatever_it_holds():
     text = coupled.text(handmade(), ['of "a"\nname = "other"', "", "tab\tand \x85 end"])
     assert text.startswith('# of "a" name = "other"\n# \n# tab and   end\n# Matrices, weights')
     assert load_coupled_mirror("mirror.toml", text=text).name == "by hand"
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_each_draw_has_the_stream_of_its_seed_and_its_number(seed):
+    known = Known(("matrices.D.1.1", "matrices.D.1.2"), np.array([1e-3, 2e-3]), np.eye(2))
+    own = replace(handmade(), known=known)
+    for number, (found, normals) in enumerate(drawn(own, 3, seed)):
+        stream = np.random.Philox(np.random.SeedSequence(seed, spawn_key=(number,)))
+        np.testing.assert_array_equal(normals, np.random.Generator(stream).standard_normal(2))
+        np.testing.assert_allclose(found.mirror.D, own.mirror.D + normals * known.standard_errors, rtol=1e-12)
+        assert draws(own, 3, seed)[number].mirror.D.tolist() == found.mirror.D.tolist()

@@ -715,3 +715,12 @@ def test_what_refuses_most_draws_is_told_with_how_often(read, monkeypatch):
     monkeypatch.setattr(mirror_spread, "TRIES", 6)
     found = mirror_spread.parameters(mirror, np.array([[-3.0, 0.0]]), lambda row: iter(others))
     assert_allclose(found, [[80e-6, 150.0]])
+
+
+def test_the_reason_that_is_told_is_that_of_the_first_draw_that_was_refused_for_it(read, monkeypatch):
+    monkeypatch.setattr(mirror_spread, "TRIES", 3)
+    mirror = read(BOUC_WEN + table(["linear.pole_dampings.1"], [1.0]))
+    with pytest.raises(ValueError) as caught:
+        mirror_spread.parameters(mirror, np.array([[3.0]]), lambda row: iter(np.array([[4.0], [5.0]])))
+    assert "3 times because linear.pole_dampings item 1: " in str(caught.value)
+    assert "1.4" in str(caught.value) and "1.75" not in str(caught.value) and "2.1" not in str(caught.value)
