@@ -1120,3 +1120,17 @@ def test_each_draw_has_the_stream_of_its_seed_and_its_number(seed):
         np.testing.assert_array_equal(normals, np.random.Generator(stream).standard_normal(2))
         np.testing.assert_allclose(found.mirror.D, own.mirror.D + normals * known.standard_errors, rtol=1e-12)
         assert draws(own, 3, seed)[number].mirror.D.tolist() == found.mirror.D.tolist()
+
+
+@pytest.mark.parametrize("change", [-0.25, 0.25])
+def test_what_is_0_in_an_element_stays_at_least_0(change):
+    """A weight and a threshold of 0, and no widening; a coefficient of 0 may fall."""
+    own = handmade()
+    bent = replace(own.mirror.plays[1], weights_rad_v=(0.3, 0.0, 0.05), polynomial_rad=(0.7, 0.0, 0.9))
+    own = replace(own, mirror=replace(own.mirror, plays=(own.mirror.plays[0], bent)))
+    keys = ("2.thresholds.1", "3.weights.2", "3.widening", "3.polynomial.2")
+    first, second = changed(own, {f"hysteresis.{key}": change for key in keys}).mirror.plays
+    least = max(change, 0.0)
+    assert first == replace(own.mirror.plays[0], thresholds_v=(least, 1.5))
+    weights, bends = (0.3, least, 0.05), (0.7, change, 0.9)
+    assert second == replace(bent, weights_rad_v=weights, widening_s=least, polynomial_rad=bends)

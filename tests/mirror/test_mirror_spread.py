@@ -724,3 +724,11 @@ def test_the_reason_that_is_told_is_that_of_the_first_draw_that_was_refused_for_
         mirror_spread.parameters(mirror, np.array([[3.0]]), lambda row: iter(np.array([[4.0], [5.0]])))
     assert "3 times because linear.pole_dampings item 1: " in str(caught.value)
     assert "1.4" in str(caught.value) and "1.75" not in str(caught.value) and "2.1" not in str(caught.value)
+
+
+def test_a_list_that_begins_with_0_has_the_value_and_the_sign_of_its_first_item_that_is_not(read):
+    mirror = read(PLAYS + table(["prandtl_ishlinskii.thresholds", "linear.poles.2"], [0.3, 0.2], [0.5]))
+    assert_allclose(mirror_spread.values(mirror), [1.0, 400.0])
+    assert_allclose(mirror_spread.relative_covariance(mirror), [[0.09, 0.03], [0.03, 0.04]], rtol=1e-12)
+    found = mirror_spread.moved(mirror, np.array([1.5, 1.0]))
+    assert found.prandtl_ishlinskii.thresholds_v == (0.0, 1.5, 3.0)
