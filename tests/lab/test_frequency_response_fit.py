@@ -990,3 +990,13 @@ def test_a_start_whose_sums_are_singular_is_that_of_a_vector_fit_with_the_weight
     np.testing.assert_allclose(found.poles_rad_s, expected.poles_rad_s, rtol=1e-3)  # both end within a millionth
     np.testing.assert_allclose(found.residues, expected.residues, rtol=1e-2, atol=1e-2)
     assert found.rms_error == pytest.approx(expected.rms_error, rel=1e-5) and found.direct.any() == (not proper)
+
+
+def test_the_largest_of_several_orders_has_to_have_fewer_numbers_than_the_table():
+    freq = np.arange(1.0, 11.0)
+    with pytest.raises(IdentificationError) as refused:
+        fit_frequency_response(freq, 1.0 / (1.0 + 0.3j * freq), [9, 2], delay=True)
+    assert str(refused.value) == (
+        "a model of order 9 has 20 numbers, and 10 frequencies give 20 real values; give more frequencies or a lower "
+        "order."
+    )
