@@ -292,3 +292,13 @@ def test_signs_are_a_row_for_each_output(signs):
 def test_of_records_without_noise_each_contradiction_is_certain():
     told = refusal(made(GAIN, error=0.0), ((-1, 0), (0, 0)), TWO)
     assert told.startswith("u.npy: at low frequency the output 'y0' rises with the drive 'u0', and `signs` says")
+
+
+@pytest.mark.parametrize("drive", range(4))
+def test_each_of_four_drives_has_to_move_something(drive):
+    gain = np.array(WIDE, dtype=float)
+    gain[:, drive] = 0.0
+    assert refusal(made(gain, error=0.1), None, THREE) == (
+        f"u.npy: the drive 'u{drive}' moves nothing: the response of every output to it is within its noise; check the "
+        "actuator and its amplifier, drive it harder, or leave it out."
+    )
