@@ -10,7 +10,7 @@ import random
 import re
 import shutil
 import subprocess
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
 from html import unescape
 from importlib import resources
 from pathlib import Path
@@ -26,8 +26,10 @@ from microrad.campaign.statistics import sensitivity, tails
 from microrad.core import integrity
 from microrad.core.kept import Kept
 from microrad.core.units import format_quantity
+from microrad.lab import recording
 from microrad.lab.identify import records
-from microrad.lab.identify.linear import fit, uncertainty
+from microrad.lab.identify.hysteresis import structures
+from microrad.lab.identify.linear import amplitude, fit, uncertainty
 from microrad.lab.identify.selection import warnings
 from microrad.link import gains, variation
 from microrad.link import study as link_study
@@ -3328,3 +3330,157 @@ def test_a_cell_with_a_mark_and_no_hint_has_the_reason_of_its_sign_for_a_hint(fa
     _, bare, hinted = far.table(table).rows[0]
     assert (str(bare), str(hinted)) == ("3 † FAIL", "4 † PASS")
     assert bare.hint.startswith("loop.rate = 2 kHz is 2 times") and hinted.hint == f"why {bare.hint}"
+
+
+# -------------------------------------------------------------------------------- checks whose recordings are not here
+def told_of(found):
+    return [(c.quantity, c.what, c.expected, c.obtained, c.tolerance, c.unit) for c in found]
+
+
+def test_each_amplitude_of_a_satellites_mirror_has_its_own_error_resonance_and_size(monkeypatch):
+    """The root mean square of 1 and 7 is 5: errors of 0.1 and 0.25 um on outputs of 2 and 5 um."""
+    pair, asked = np.array([1.0, 7.0]) / 5.0, []
+    errors, sizes = {"fit 100": 0.1e-6, "fit 300": 0.25e-6}, {100: 2e-6, 300: 5e-6}
+
+    def multisines(workspace, amplitude_mv):
+        return [f"{amplitude_mv} a", f"{amplitude_mv} b", SimpleNamespace(output=sizes[amplitude_mv] * pair)]
+
+    def fitted(records, order, **more):
+        asked.append((records, order, more))
+        return SimpleNamespace(modes=f"fit {records[0][:3]}")
+
+    def dependence(fits):
+        assert [each.modes for each in fits] == ["fit 100", "fit 300"]
+        return SimpleNamespace(resonance_hz=np.array([924.5, 921.9]), gain_rise_percent=9.25)
+
+    monkeypatch.setattr(measured, "_multisines", multisines)
+    monkeypatch.setattr(fit, "fit_linear", fitted)
+    monkeypatch.setattr(fit, "output_error", lambda modes, held_out, drop: errors[modes] * pair * (drop / 1000))
+    monkeypatch.setattr(amplitude, "amplitude_dependence", dependence)
+    found = list(measured._cubespec(None))
+    assert asked == [(["100 a", "100 b"], 28, {"exchanges": 0}), (["300 a", "300 b"], 28, {"exchanges": 0})]
+    error, pole = "identify.linear.held_out", "identify.linear.poles_and_zeros.freq_hz"
+    behind = "mV: measured less modelled over measured, rms, held out"
+    assert told_of(found) == [
+        (error, f"mirror of a satellite at 100 {behind}", *map(pytest.approx, (0.0, 0.05, 0.0571)), ""),
+        (error, f"mirror of a satellite at 300 {behind}", *map(pytest.approx, (0.0, 0.05, 0.04554)), ""),
+        (pole, "main resonance at 100 mV", 924.2, 924.5, 0.5, "Hz"),
+        (pole, "main resonance at 300 mV", 921.1, 921.9, 0.5, "Hz"),
+        ("", "rise of the gain from 100 to 300 mV", 8.0, 9.25, 1.5, "%"),
+    ]
+    assert [each.holds for each in found] == [True, False, True, False, True]
+
+
+def test_records_that_are_held_out_are_the_last_of_each_amplitude_and_the_second_half_of_seven_samples(
+    tmp_path, monkeypatch
+):
+    of, asked = workspace.Workspace(tmp_path, tmp_path), []
+    for k, name in enumerate(measured.HELD_OUT["cubespec"].files):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        np.save(tmp_path / name, np.array([float(k)]))
+
+    def realisations(drive, output, rate_hz, name):
+        asked.append((drive.tolist(), output.tolist(), rate_hz, name))
+        return [f"{name} first", f"{name} last"]
+
+    monkeypatch.setattr(recording, "multisine_recordings", realisations)
+    assert measured.HELD_OUT["cubespec"].records(of) == ["100 mV last", "300 mV last"]
+    assert asked == [([0.0], [1.0], 6400.0, "100 mV"), ([2.0], [3.0], 6400.0, "300 mV")]
+    assert [name[9:16] for name in measured.HELD_OUT["cubespec"].files] == ["u_100mV", "y_100mV", "u_300mV", "y_300mV"]
+
+    whole = make_dataclass("Record", ["drive", "output", "samples", "name"])
+    record = whole(np.arange(7.0)[:, None], 10.0 * np.arange(7.0)[:, None], 7, "slow")
+    monkeypatch.setattr(recording, "read_recording", lambda *given: asked.append(given) or record)
+    path = tmp_path / "piezo_1hz" / "Model_Vi_Do.dat"
+    path.parent.mkdir()
+    path.write_text("")
+    (half,) = measured.HELD_OUT["piezo-loop"].records(of)
+    assert (half.drive.ravel().tolist(), half.output.ravel().tolist()) == ([3, 4, 5, 6], [30, 40, 50, 60])
+    assert (half.name, asked[-1]) == ("slow", (path, 0, 4, 200.0))
+
+
+def test_what_is_left_of_a_hysteretic_spring_is_the_noise_about_its_mean_behind_the_first_period(tmp_path, monkeypatch):
+    """The spring of this record gives three times its drive once it is steady; the gauge has an offset."""
+    count, asked = 8192, []
+    time = 2.0 * np.pi * np.arange(count) / count
+    drive = np.sin(3.0 * time) + 0.25 * np.cos(40.0 * time)
+    noise = np.where(np.arange(count) % 2, 7.25e-6, -7.25e-6)
+    output = np.concatenate([np.full(count, 5.0), 0.5 + 3.0 * drive + noise, 0.5 + 3.0 * drive - noise])
+    record = SimpleNamespace(drive=np.tile(drive, 3)[:, None], output=output[:, None])
+
+    def response(fine, step_s):
+        asked.append((fine.size, step_s))
+        return np.where(np.arange(fine.size) < 20 * count, 99.0, 3.0 * fine)
+
+    def spring(*parameters):
+        return SimpleNamespace(
+            build=lambda values: (
+                asked.append((parameters, tuple(values.tolist()))) or SimpleNamespace(response=response)
+            )
+        )
+
+    monkeypatch.setattr(structures, "hysteretic_oscillator", spring)
+    monkeypatch.setattr(recording, "read_recording", lambda *given, **more: asked.append((given, more)) or record)
+    path = tmp_path / "boucwen" / "train.h5"
+    path.parent.mkdir()
+    path.write_text("")
+    (found,) = measured._oscillator(workspace.Workspace(tmp_path, tmp_path))
+    published_ones = (2.0, 10.0, 5e4, 5e4, 800.0, -1100.0)
+    assert asked == [
+        ((path, "multisine/u", "multisine/y", 750.0), {"period_samples": 8192}),
+        (published_ones, published_ones),
+        (2 * 20 * count, pytest.approx(1.0 / 15000.0)),
+    ]
+    assert (found.expected, found.obtained, found.tolerance) == (7.3e-6, pytest.approx(7.25e-6, rel=1e-4), 0.1e-6)
+    assert (found.quantity, found.unit, found.holds) == ("", "m", True)
+    assert "by its published parameters: rms that is left" in found.what
+
+
+# ------------------------------------------------------------------------------------------- a verification, whole
+@pytest.mark.parametrize("full", [False, True])
+def test_all_checks_share_one_workspace_and_a_full_run_sweeps_behind_them(tmp_path, monkeypatch, full):
+    seen, told, asked = [], [], []
+    of = [replace(a_check(k, Referent.INDEPENDENT), run=lambda made: seen.append(made) or iter(())) for k in (2, 1, 3)]
+    kept = {"recordings": {"one": "old", "two": "old"}, "domains": {"d": "old"}, "depends": {"k": ["old"]}}
+
+    def progress(done, total, what):
+        told.append((done, total, what))
+
+    monkeypatch.setattr(findings, "every", lambda: of)
+    monkeypatch.setattr(findings, "integrity", lambda: WHOLE)
+    monkeypatch.setattr(findings, "shipped", lambda: kept)
+    monkeypatch.setattr(findings, "recorded", lambda made, outcomes: {"two": [len(outcomes), made is seen[0]]})
+    monkeypatch.setattr(findings, "held_recordings", lambda made: {"file": str(made.data)})
+    monkeypatch.setattr(findings, "swept", lambda on_progress: asked.append(on_progress) or {"d": "new"})
+    monkeypatch.setattr(findings, "dependences", lambda on_progress: asked.append(on_progress) or {"k": ["new"]})
+    monkeypatch.chdir(tmp_path)
+    for named_folder, data in (("", None), (str(tmp_path / "here"), tmp_path / "here")):
+        seen.clear(), told.clear(), asked.clear()
+        monkeypatch.setenv("MICRORAD_DATA", named_folder)
+        found = findings.verify(full=full, on_progress=progress)
+        assert len(seen) == 3 and len(set(map(id, seen))) == 1 and seen[0].data == data
+        assert told == [(0, 3, "Title 2"), (1, 3, "Title 1"), (2, 3, "Title 3"), (3, 3, "done")]
+        assert asked == [progress, progress] * full
+        assert [o.check.name for o in found.outcomes] == ["c2", "c1", "c3"] and found.integrity is WHOLE
+        which = "new" if full else "old"
+        assert (found.full, found.domains, found.depends) == (full, {"d": which}, {"k": [which]})
+        assert found.recordings == {"one": "old", "two": [3, True] if full else "old"}
+        assert found.files == {"file": str(data)}
+
+
+@pytest.mark.parametrize(
+    ("error", "trouble", "absent"),
+    [
+        (AssertionError(), "AssertionError: ", ""),
+        (ValueError("first\nsecond"), "ValueError: first", ""),
+        (KeyError("a.b"), "KeyError: 'a.b'", ""),
+        (evidence.NotHereError("one file\nand another"), "", "one file\nand another"),
+    ],
+)
+def test_a_check_that_ends_early_has_none_of_its_comparisons_and_says_why_even_without_words(error, trouble, absent):
+    def ends(_):
+        yield a_comparison(1, 10.0)
+        raise error
+
+    of = replace(a_check(1, Referent.PUBLISHED), run=ends)
+    assert check.run(of, None) == check.Outcome(of, (), trouble, absent)
