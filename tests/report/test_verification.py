@@ -25,6 +25,7 @@ from microrad.campaign.rows import sampling
 from microrad.campaign.statistics import sensitivity, tails
 from microrad.core import integrity
 from microrad.core.kept import Kept
+from microrad.core.machine import machine, versions
 from microrad.core.units import format_quantity
 from microrad.lab import recording
 from microrad.lab.identify import records
@@ -3484,3 +3485,304 @@ def test_a_check_that_ends_early_has_none_of_its_comparisons_and_says_why_even_w
 
     of = replace(a_check(1, Referent.PUBLISHED), run=ends)
     assert check.run(of, None) == check.Outcome(of, (), trouble, absent)
+
+
+def test_what_is_missed_without_words_is_named_by_its_quantity_and_what_is_open_by_rising_numbers(monkeypatch):
+    missed = (a_comparison(1, 99.0), replace(a_comparison(2, 99.0, MODULUS), what=""), a_comparison(3, 30.0))
+    asked = [("40, 9 to 11", "open"), ("5", "here"), ("6, 12", "user"), ("3", "open"), ("100", "part")]
+    of = [standard.Requirement(number, "t", stands, "told") for number, stands in asked]
+    monkeypatch.setattr(warned, "requirements", lambda: of)
+    outcomes = [check.Outcome(a_check(k, Referent.PUBLISHED), missed[k - 4 :]) for k in (5, 6)]
+    found = [w.found for w in warned.warnings(replace(unlike(), outcomes=outcomes))]
+    assert found[:2] == [f"c5: beyond tolerance: {MODULUS}.", "Tolerances of comparisons are the only criteria. There"
+                         " are none for uncertainty, sensitivities and levels of credibility (M&S 43)."]  # fmt: skip
+    assert "None was granted: there is no authority that could. Not met are M&S 3, 9, 10, 11, 40." in found
+    (first,) = warned.warnings(replace(unlike(), outcomes=[replace(outcomes[0], comparisons=missed)]))[:1]
+    assert first.found == f"c5: beyond tolerance: figure 1, {MODULUS}."
+
+
+def test_made_requirements_stand_with_all_their_places_and_those_of_revision_a_alone_do_not_count(monkeypatch):
+    made = (
+        standard.Requirement("2 to 4", "gone ones", "gone", "handbook", said="In none."),
+        standard.Requirement(
+            "9, 36", "first", "open", "told", ["risks", "purpose"], ["a", "b"], part="Links", said="None. Yet."
+        ),
+        standard.Requirement("7", "second", "here", "quoted", pages=["c"], part="Day"),
+        standard.Requirement("5", "third", "user", "handbook"),
+    )
+    monkeypatch.setattr(page, "requirements", lambda: made)
+    counted, table, about = page._standard()
+    assert counted == (
+        "Of 4 requirements: 1 answered in this report, 0 met in part, 0 answered in the documentation, 0 answered in"
+        " the report of each mission, 1 for whoever uses the numbers, 2 not met."
+    )
+    places = "Known defects and risks; Intended use and limits; docs/a.md; docs/b.md; mission's report: Links"
+    by = ("handbook of revision A", "summaries of revision B by others", "quotations of revision B")
+    assert told_rows(table) == [
+        ["2 to 4", "gone ones", "of revision A alone", "In none.", by[0]],
+        ["9, 36", "first", "not met !", f"{places}. None. Yet.", by[1]],
+        ["7", "second", "answered in this report", "docs/c.md; mission's report: Day", by[2]],
+        ["5", "third", "for whoever uses the numbers", "", by[0]],
+    ]
+    assert isinstance(about, Soft)
+
+
+def test_of_several_checks_with_recordings_each_has_its_own_records_and_errors(monkeypatch):
+    """The first is not one with recordings, the second has no error, the third fails; two are left."""
+    t = np.arange(50.0)
+
+    def held_out(name, inputs, outputs, metres):
+        drive, output = (np.column_stack([np.sin(t)] * count) for count in (inputs, outputs))
+        records = [recording_of(drive, output, 10.0), recording_of(4.0 * drive, output, 20.0)]
+        keys = (f"{name}.f", f"{name}.g")
+        return measured.HeldOut(f"part {name}", (f"{name}1", f"{name}2"), lambda _: records, metres, keys)
+
+    ways = {"c2": ("b", 1, 1, 1.0), "c3": ("c", 1, 1, 1.0), "c4": ("d", 2, 3, 1.0), "c5": ("e", 3, 1, 1e-3)}
+    monkeypatch.setattr(recorded, "HELD_OUT", {name: held_out(*way) for name, way in ways.items()})
+
+    def an_error(k, obtained, tolerance, unit):
+        return Comparison(recorded._ERROR, f"error {k}", 0.0, obtained, tolerance, unit, "why")
+
+    errors = (an_error(1, 0.0123456, 0.0567891, ""), an_error(2, 1.2355, 2.0, "%"))
+    made = [
+        check.Outcome(a_check(1, Referent.MEASUREMENT), errors),
+        check.Outcome(a_check(2, Referent.MEASUREMENT), (a_comparison(1, 10.0),)),
+        check.Outcome(a_check(3, Referent.MEASUREMENT), (*errors, an_error(3, 5.0, 1.0, "%"))),
+        check.Outcome(a_check(4, Referent.MEASUREMENT), (errors[1], a_comparison(1, 10.0), errors[0])),
+        check.Outcome(a_check(5, Referent.MEASUREMENT), errors[:1]),
+    ]
+    found = recorded.recorded(None, made)
+    assert list(found) == ["c4", "c5"]
+    told_errors = [
+        {"what": "error 2", "unit": "%", "error": 1.24, "allowed": 2.0},
+        {"what": "error 1", "unit": "", "error": 0.0123, "allowed": 0.0568},
+    ]
+    span = float(f"{np.ptp(np.sin(t)):.4g}")
+    for name, letter, inputs, outputs, metres, own in (
+        ("c4", "d", 2, 3, 1.0, told_errors),
+        ("c5", "e", 3, 1, 1e-3, told_errors[1:]),
+    ):
+        of = found[name]
+        assert (of["part"], of["records"], of["frequencies"]) == (
+            *(f"part {letter}", [f"{letter}1", f"{letter}2"], [f"{letter}.f", f"{letter}.g"]),
+        )
+        assert (of["inputs"], of["outputs"], of["errors"]) == (inputs, outputs, own)
+        assert of["extents"]["position"] == {"unit": "m", "least": span * metres, "most": span * metres}
+        assert of["extents"]["rate"] == {"unit": "Hz", "least": 10.0, "most": 20.0}
+
+
+def test_each_of_two_sweeps_draws_anew_and_a_draw_is_as_far_as_its_farthest_input(monkeypatch):
+    """Factors of unlike ends: a draw's share of the way is that of their logarithms."""
+    ends = {"communication.distance": (0.25, 2.0), "terminals.leo_aperture": (0.5, 10.0)}
+    of = [
+        sweeps.Sweep("first", ("tornado", "budgets"), ends, 6),
+        sweeps.Sweep("second", ("tracking",), {"beacon.divergence": (0.1, 3.0)}, 3),
+    ]
+    asked, told, domains = [], [], []
+
+    def held(made, factors):
+        asked.append(([each.name for each in made], factors))
+        return None if len(asked) == 2 else len(asked) != 3
+
+    monkeypatch.setattr(sweeps, "_held", held)
+    monkeypatch.setattr(sweeps, "_domain", lambda draws, keys: domains.append((draws, list(keys))) or {"draws": 0})
+    found = sweeps.swept(of, lambda *given: told.append(given))
+    assert found == {
+        "first": {"checks": ["tornado", "budgets"], "draws": 0},
+        "second": {"checks": ["tracking"], "draws": 0},
+    }
+    assert told == [(k, 9, "domains") for k in range(1, 10)]
+    assert [names for names, _ in asked] == [["tornado", "budgets"]] * 6 + [["tracking"]] * 3
+    (first, keys), (second, others) = domains
+    assert (keys, others) == (list(ends), ["beacon.divergence"])
+    assert [factors for _, factors, _ in first] == [factors for _, factors in (asked[0], *asked[2:6])]
+    assert [is_held for _, _, is_held in (*first, *second)] == [True, False, *[True] * 6]
+    for share, factors, _ in first:
+        ways = [math.log(f) / math.log(ends[key][f > 1.0]) for key, f in factors.items()]
+        assert share == pytest.approx(max(ways)) and 0.0 < min(ways) < max(ways) < 1.0
+    alone = len(domains)
+    sweeps.swept(of[1:])
+    assert [draw[1] for draw in domains[alone][0]] == [draw[1] for draw in second]
+
+
+FARTHER = ((0.4, 1.23456, 1.0, True), (0.2, 0.5, 2.0, True), (0.6, 9.0, 9.0, True))
+
+
+@pytest.mark.parametrize(
+    ("drawn", "inside", "distance", "aperture"),
+    [
+        (FARTHER, 3, (2.1e7, 3.78e8), (0.05, 0.45)),
+        (((0.5, 7.0, 7.0, False), *FARTHER, (0.5, 5.0, 5.0, True)), 2, (2.1e7, 5.185e7), (0.05, 0.1)),
+        (((0.9, 7.0, 7.0, False), *FARTHER, (0.3, 5.0, 5.0, False)), 1, (2.1e7, 4.2e7), (0.05, 0.1)),
+        (((0.3, 3.0, 3.0, True), (0.1, 0.25, 0.25, False)), 0, (4.2e7, 4.2e7), (0.05, 0.05)),
+    ],
+)
+def test_a_domain_has_the_shipped_values_and_those_of_draws_nearer_than_the_nearest_that_fails(
+    drawn, inside, distance, aperture
+):
+    keys = ("communication.distance", "terminals.leo_aperture")
+    made = [(share, {keys[0]: one, keys[1]: other}, holds) for share, one, other, holds in drawn]
+    found = sweeps._domain(made, keys)
+    assert (found["draws"], found["inside"]) == (len(made), inside)
+    assert found["extents"] == {
+        key: {"unit": "m", "least": least, "most": most}
+        for key, (least, most) in zip(keys, (distance, aperture), strict=True)
+    }
+
+
+def test_numbers_of_two_documents_stand_below_their_names_and_a_refused_mission_has_none(tmp_path, monkeypatch):
+    asked = []
+
+    class Made:
+        text = "shipped"
+
+        def __init__(self, folder, data, parts):
+            asked.append((folder, data, type(parts)))
+
+        def take(self, text):
+            asked.append(text)
+
+        def numbers(self, document):
+            if asked[-1] == "refused: x.z times 3.0":
+                raise ValueError("no such mission")
+            return {"a": float(len(document)), "b.c": 1.0}
+
+    def changed(text, factors):
+        ((key, factor),) = factors.items()
+        return f"{'refused' if factor == 3.0 else text}: {key} times {factor}"
+
+    monkeypatch.setattr(dependences, "Workspace", Made)
+    monkeypatch.setattr(dependences, "changed", changed)
+    both = {"budget.a": 6.0, "budget.b.c": 1.0, "run.a": 3.0, "run.b.c": 1.0}
+    assert dependences._numbers(tmp_path, ("budget", "run"), "x.y", 2.0) == both
+    assert asked == [(tmp_path, None, Kept), "shipped: x.y times 2.0"]
+    assert dependences._numbers(tmp_path, ("run",), "", 1.0) == {"run.a": 3.0, "run.b.c": 1.0}
+    assert dependences._numbers(tmp_path, ("run",), "x.z", 3.0) is None
+    assert asked[2:] == [(tmp_path, None, Kept), (tmp_path, None, Kept), "refused: x.z times 3.0"]
+
+
+def test_a_document_is_made_once_and_a_figure_that_it_has_not_holds_nowhere(tmp_path, monkeypatch):
+    made, asked = {"budget": {"lines": [{"name": "P", "value": 37.0, "unit": "dBm"}]}, "run": {"a": {"x_db": 3.0}}}, []
+    monkeypatch.setattr(workspace.Workspace, "_made", lambda self, document: asked.append(document) or made[document])
+    of = workspace.Workspace(tmp_path, None)
+    found = [
+        of.compared("budget", "lines.P.value", 36, 1.0, "one"),
+        of.compared("run", "a.x_db", 3.0, 0.25, "two"),
+        of.compared("budget", "a.x_db", 3.0, 9.0, "three"),
+    ]
+    assert found[:2] == [
+        Comparison("budget.lines.P.value", "lines, P, value", 36.0, 37.0, 1.0, "dBm", "one"),
+        Comparison("run.a.x_db", "a, x_db", 3.0, 3.0, 0.25, "dB", "two"),
+    ]
+    assert (found[2].quantity, math.isnan(found[2].obtained), found[2].unit) == ("budget.a.x_db", True, "dB")
+    assert [each.holds for each in found] == [True, True, False] and isinstance(found[0].expected, float)
+    assert asked == ["budget", "run"]
+
+
+def test_recordings_of_an_installation_have_each_their_own_hash_and_stand_only_where_there_are_some():
+    v = unlike()
+    parts, recordings = page._installation(v)
+    assert dict(told_rows(parts)) == {**versions(), **machine()}
+    (table,) = recordings.blocks
+    hashes = {name: measured.SHA256[name] for name in v.files}
+    assert recordings.title == "Recordings" and len(set(hashes.values())) == 2
+    assert told_rows(table) == [[name, stands, hashes[name][:12]] for name, stands in v.files.items()]
+    assert page.verification_data(v)["recording_files"] == {
+        name: {"sha256": hashes[name], "here": stands} for name, stands in v.files.items()
+    }
+    assert len(page._installation(replace(v, files={}))) == 1
+
+
+def test_factors_stand_in_two_groups_with_what_their_level_and_the_next_one_mean():
+    v, scale = unlike(), standard._read()["scale"]
+    about, *tables = page._credibility(v)
+    assert isinstance(about, Soft)
+    titles = ["Capability: what was built", "Results: what it is used for"]
+    assert [(table.title, len(table.rows)) for table in tables] == [(titles[0], 5), (titles[1], 6)]
+    said = [("insufficient evidence", *scale[f.name]) for f in v.factors]
+    rows = [
+        [f.name, f"{f.level}: {means[f.level]}", f.reason, f"{f.next_needs} By the scale: {means[f.level + 1]}."]
+        for f, means in zip(v.factors, said, strict=True)
+    ]
+    assert told_rows(tables[0]) + told_rows(tables[1]) == rows
+    data = page.verification_data(v)["credibility"]
+    assert [(each["assessment"], each["level"], each["means"], each["next_means"]) for each in data] == [
+        (titles[place >= 5], f.level, means[f.level], means[f.level + 1])
+        for place, (f, means) in enumerate(zip(v.factors, said, strict=True))
+    ]
+    assert [(each["why"], each["next"]) for each in data] == [(f.reason, f.next_needs) for f in v.factors]
+
+
+def test_an_installation_without_a_defect_says_that_there_is_none():
+    v = unlike()
+    sound = replace(v, outcomes=(*v.outcomes[:2], v.outcomes[4]), standings=v.standings[:4])
+    assert page._known(sound) == ["No comparison fails, and every quantity has at least a source."]
+
+
+@pytest.mark.parametrize(
+    ("of", "figures"),
+    [
+        (
+            published._standard,
+            [
+                ("totals.*.total_rad", "worked example, axis x, deviation", 13.51),
+                ("totals.*.total_rad", "worked example, axis z, deviation", 8.61),
+                ("totals.exact.total_rad", "two like axes, radial at 68.27 %, in deviations of one", 1.52),
+                ("totals.exact.total_rad", "two like axes, radial at 95.45 %, in deviations of one", 2.49),
+                ("totals.exact.total_rad", "two like axes, radial at 99.73 %, in deviations of one", 3.44),
+            ],
+        ),
+        (
+            published._receivers,
+            [
+                ("required_power_w", "homodyne, two phases: photons per bit at 1e-9", 8.99),
+                ("required_power_w", "heterodyne, four phases: photons per bit at 1e-9", 17.99),
+                ("required_power_w", "preamplified, differential phase: photons per bit at 1e-9", 20.03),
+                ("required_power_w", "16 positions, counted without background: photons per bit at 1e-9", 5.01),
+                ("Illumination.value", "best efficiency of a Gaussian beam through an aperture", 0.81453),
+            ],
+        ),
+        (
+            published._avalanche,
+            [
+                ("", "excess noise at a gain of 100, ionisation ratio 1", 100.0),
+                ("", "excess noise at a gain of 100, ionisation ratio 0", 1.99),
+                ("", "excess noise at a gain of 10, ionisation ratio 0.02", 2.062),
+            ],
+        ),
+        (
+            published._random,
+            [("", f"Philox 4x32-10, known answer {place}: words that differ", 0) for place in (1, 2, 3)],
+        ),
+        (
+            measured._orbits,
+            [
+                ("", "inclination of Sentinel-1A at 693 km", 98.18),
+                ("", "inclination of SPOT-4 at 822 km", 98.72),
+                ("", "inclination of Landsat 8 at 705 km", 98.2),
+            ],
+        ),
+        (
+            ground._book,
+            [
+                ("elevations.0.isoplanatic_rad", "isoplanatic angle", 13.5e-6),
+                ("elevations.0.index", "downlink at a point", 0.13),
+                ("Answer.lines.Scintillation index.value", "uplink that does not wander", 0.07),
+                ("Communication.lines.Fried's parameter.value", "r0", 0.1124),
+            ],
+        ),
+        (
+            ground._recommendation,
+            [
+                ("elevations.0.rytov", f"{wind} m/s, {length} um", printed)
+                for wind, row in ((21, (0.23, 0.13, 0.10, 0.07)), (30, (0.36, 0.21, 0.16, 0.10)))
+                for length, printed in zip((0.532, 0.85, 1.064, 1.55), row, strict=True)
+            ],
+        ),
+    ],
+)
+def test_published_figures_are_told_by_what_they_are_and_hold(of, figures):
+    found = list(of(None))
+    assert [(c.what, c.expected) for c in found] == [figure[1:] for figure in figures]
+    assert [c.what for c, (name, *_) in zip(found, figures, strict=True) if not c.quantity.endswith(name)] == []
+    assert all(c.holds and bool(c.quantity) is bool(name) for c, (name, *_) in zip(found, figures, strict=True))
