@@ -3584,6 +3584,8 @@ def test_each_of_two_sweeps_draws_anew_and_a_draw_is_as_far_as_its_farthest_inpu
         asked.append(([each.name for each in made], factors))
         return None if len(asked) == 2 else len(asked) != 3
 
+    checked = [SimpleNamespace(name=name) for name in ("budgets", "tracking", "tornado")]
+    monkeypatch.setattr(sweeps, "every", lambda: checked)
     monkeypatch.setattr(sweeps, "_held", held)
     monkeypatch.setattr(sweeps, "_domain", lambda draws, keys: domains.append((draws, list(keys))) or {"draws": 0})
     found = sweeps.swept(of, lambda *given: told.append(given))
