@@ -1,8 +1,11 @@
 """Flight code of an inverse that learns: the kernel's commands, and limits that nothing takes it beyond."""
 
+import math
 import subprocess
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,12 +25,13 @@ from export.test_export_flight import (  # noqa: F401
 from learning_loops import CREEP, PLAYS, in_series, loop_of, softened
 from microrad.core import kernels
 from microrad.export import choice
-from microrad.export.flight import c_code, double_run, learning_run
+from microrad.export.flight import c_code, double_run, learning_rounding, learning_run
 from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
 from microrad.export.flight.fixed_form import readings
 from microrad.export.flight.operations import fixed_operations, operations
 from microrad.export.flight.rounding import UNIT, behind_converter, errors_before_converter, rounding_bound
 from microrad.export.linear_part.sections import sections
+from microrad.export.records import AdaptiveLaw
 from microrad.loop.control import adaptive
 from microrad.loop.pointing_loop.loop import with_adaptation
 from microrad.mirror.hysteresis import NO_CREEP
@@ -306,3 +310,78 @@ def test_the_bound_of_a_command_in_fixed_point_adds_what_either_part_is_off():
     r = quantised(free, sections(free), vectors).report
     larger, both = behind_converter(free, np.array([max(r.error_v, r.inverse_v), r.error_v + r.inverse_v]))
     assert (1.0 + 1e-6) * larger < r.bound_v <= (1.0 + 1e-9) * both
+
+
+# ----------------------------------------------------------------------------------- laws and roundings, each by itself
+def test_each_actuators_law_has_its_own_row_and_plays_rounded_to_the_given_precision():
+    columns = {
+        "gain": kernels.GAIN,
+        "share": kernels.SHARE,
+        "dead_zone": kernels.DEAD_ZONE,
+        "speed": kernels.SPEED,
+        "least_size": kernels.LEAST_SIZE,
+        "least_travel": kernels.LEAST_TRAVEL,
+        "most_weight": kernels.MOST_WEIGHT,
+        "offset_limit": kernels.OFFSET_LIMIT,
+    }
+    every = [*columns.values(), kernels.CYCLE, kernels.DELAY, kernels.KEEP, kernels.LEAST_WEIGHT]
+    settings = 0.1 + 0.01 * np.arange(2.0 * (max(every) + 1)).reshape(2, -1)
+    settings[:, kernels.CYCLE], settings[:, kernels.DELAY] = (20.0, 30.0), (3.0, 4.0)
+    weight, threshold = np.array([0.1, 0.2, 0.3, 0.7, 0.9]), np.array([0.0, 0.3, 0.0, 0.1, 0.6])
+    of = AdaptiveLaw(settings, threshold, weight, np.array([0, 2, 5]))
+    for number in (np.float64, np.float32):
+        for row, own, found in zip(settings, (slice(0, 2), slice(2, 5)), learning_run.laws(of, number), strict=True):
+            for name, column in columns.items():
+                assert getattr(found, name) == float(number(row[column])), name
+            assert (found.cycle, found.delay) == (row[kernels.CYCLE], row[kernels.DELAY])
+            assert found.forgotten == float(number(1.0 - row[kernels.KEEP]))
+            first = float(number(row[kernels.LEAST_WEIGHT]))
+            assert found.least.ravel().tolist() == [first, *[0.0] * (len(weight[own]) - 1)]
+            assert found.weight.ravel().tolist() == [float(number(x)) for x in weight[own]]
+            rounded = [float(number(x)) for x in threshold[own]]
+            assert found.gaps.ravel().tolist() == [b - a for a, b in pairwise(rounded)]
+            assert found.weight.dtype == found.gaps.dtype == np.float64
+    assert learning_run.laws(of)[1].weight.tolist() == [[0.3], [0.7], [0.9]]
+
+
+def test_sums_and_products_are_off_by_the_sizes_of_their_parts_and_the_root_of_the_operations():
+    unit = 2.0**-10
+    rounded, exactly = learning_run.Roundings(unit, 2), learning_run.Roundings(0.0, 2)
+    a, b = np.array([[3.0, -1.0], [2.0, 5.0]]), np.array([[-3.0, 4.0], [0.5, 0.0]])
+    row, terms = np.array([[1.0, -2.0], [0.0, 4.0], [3.0, 1.0]]), np.array([[4.0], [9.0], [1.0]])
+    beyond, sizes = np.array([[5.0, 4.0], [2.0, 5.0]]), np.array([[5.0, 6.0], [2.0, 5.0]])
+    for found, exact, value, size in (
+        (rounded(a, 9), exactly(a, 9), a, 3.0 * np.abs(a)),
+        (rounded.total(a, b), exactly.total(a, b), a + b, math.sqrt(2.0) * (np.abs(a) + np.abs(b))),
+        (rounded.total(a, b, -a, operations=16), exactly.total(a, b, -a), b, 4.0 * (2.0 * np.abs(a) + np.abs(b))),
+        (rounded.product(row, a, terms), exactly.product(row, a, terms), row @ a,
+         np.array([[2.0], [3.0], [1.0]]) * (np.abs(row) @ np.abs(a))),
+        (rounded.totals_from_beyond(a, 4), exactly.totals_from_beyond(a, 4), beyond, 2.0 * (0.0 + sizes)),
+    ):  # fmt: skip
+        np.testing.assert_allclose(exact, [[5.0, 4.0], [2.0, 5.0]] if value is beyond else value, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(np.abs(found - value), unit * size, rtol=1e-12)
+
+
+@pytest.mark.parametrize("linear", [True, False])
+def test_a_bound_of_what_learns_is_six_times_the_rms_of_its_runs_by_sample_and_actuator(monkeypatch, linear):
+    """The readings are rounded to single precision; where the linear part is exact, its outputs come instead."""
+    inputs, outputs = np.array([[0.1, 2.0], [0.3, 4.0]]), np.array([[7.0, 8.0, 9.0], [10.0, 11.0, 12.0]])
+    free, asked = np.array([[1.0, -2.0], [3.0, 5.0]]), []
+    off = np.array([[3.0, -3.0, 3.0, 3.0], [1.0, -7.0, 7.0, -1.0]])
+
+    class Code:
+        def __init__(self, of, form):
+            asked.append((of, form))
+
+        def step(self, readings):
+            asked.append(readings.tolist())
+            return free[len(asked) - 2][:, None] + off * (len(asked) - 1)
+
+        beside = step
+
+    monkeypatch.setattr(learning_rounding, "_Single", Code)
+    run = SimpleNamespace(free=free, outputs=outputs)
+    found = learning_rounding.learning_errors("of", "form", run, inputs if linear else None)
+    np.testing.assert_allclose(found, [[18.0, 30.0], [36.0, 60.0]])
+    readings_ = inputs.astype(np.float32).astype(float) if linear else outputs
+    assert asked == [("of", "form"), *readings_.tolist()]

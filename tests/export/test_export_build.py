@@ -4,6 +4,7 @@ import math
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -347,3 +348,93 @@ def test_the_words_of_the_compiler_are_those_of_the_environment(
     with pytest.raises(ExportError) as told:
         build.compiler_words()
     assert str(told.value).startswith(words)
+
+
+# ------------------------------------------------------------------------------------------- what ends early, and how
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="no groups of processes here")
+def test_who_interrupts_the_wait_ends_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[subprocess.Popen[str]] = []
+
+    class Popen(subprocess.Popen[str]):
+        def communicate(self, input: str | None = None, timeout: float | None = None) -> tuple[str, str]:
+            made.append(self)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(subprocess, "Popen", Popen)
+    with pytest.raises(KeyboardInterrupt):
+        build.run((sys.executable, "-c", "import time; time.sleep(5)"), tmp_path)
+    assert made[0].returncode == -signal.SIGKILL
+
+
+@pytest.mark.parametrize("groups", [True, False])
+def test_a_program_that_ended_just_in_time_or_has_no_group_is_told_to_have_taken_too_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, groups: bool
+) -> None:
+    """Where there are no groups of processes, as on Windows, the program itself is ended."""
+    ended: list[str] = []
+
+    class Popen(subprocess.Popen[str]):
+        def communicate(self, input: str | None = None, timeout: float | None = None) -> tuple[str, str]:
+            assert timeout == 2.5
+            raise subprocess.TimeoutExpired(self.args, timeout)
+
+        def kill(self) -> None:
+            ended.append("program")
+            super().kill()
+
+    def killpg(group: int, number: int) -> None:
+        ended.append("group")
+        raise ProcessLookupError
+
+    monkeypatch.setattr(subprocess, "Popen", Popen)
+    monkeypatch.setattr(build, "TIME_LIMIT_S", 2.5)
+    if groups:
+        monkeypatch.setattr(build.os, "killpg", killpg, raising=False)
+    else:
+        monkeypatch.delattr(build.os, "killpg", raising=False)
+    with pytest.raises(ExportError) as told:
+        build.run((sys.executable, "-c", "0", "a b"), tmp_path)
+    assert str(told.value) == f"{sys.executable} -c 0 'a b' in {tmp_path} did not end within 2.5 s and was stopped"
+    assert ended == (["group"] if groups else ["program"])
+
+
+def test_of_three_files_of_code_those_that_are_missing_are_named_and_one_pass_is_enough(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written(tmp_path)
+    asked: list[object] = []
+    monkeypatch.setattr(build, "_compile", lambda folder, name: asked.append((folder, name)) or folder / "made")
+    monkeypatch.setattr(
+        build, "run", lambda command, folder: asked.append((command, folder)) or (0, WHOLE.format("1e-4"))
+    )
+    for passes, words in (({}, "20"), ({"passes": 1}, "1")):
+        asked.clear()
+        assert build.compile_and_run(tmp_path, "gain", **passes) == replace(EXPECTED, largest_difference_v=1e-4)
+        assert asked == [(tmp_path, "gain"), ((str(tmp_path / "made"), "vectors.csv", words), tmp_path)]
+    (tmp_path / "vectors.csv").unlink()
+    (tmp_path / "vectors.csv").mkdir()
+    (tmp_path / "gain.c").unlink()
+    with pytest.raises(ExportError) as told:
+        build.compile_and_run(tmp_path, "gain")
+    assert str(told.value) == (
+        f"{tmp_path} has no gain.c, no vectors.csv: export the code there first (microrad export c)"
+    )
+
+
+def test_what_a_bench_leaves_out_is_named_in_the_order_of_the_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "".join(
+        f"{line}\n" for line in WHOLE.format("1e-4").splitlines() if line.split()[0] not in ("clock_ns", "bound_v")
+    )
+    monkeypatch.setattr(build, "_compile", lambda folder, name: folder / "made")
+    for code, said in (
+        (0, "printed no bound_v, no clock_ns:"),
+        (1, "failed with exit status 1:"),  # with no bound nothing is beyond it
+    ):
+        monkeypatch.setattr(build, "run", lambda command, folder, code=code: (code, text))
+        with pytest.raises(ExportError) as told:
+            build.compile_and_run(written(tmp_path), "gain")
+        first, *lines = str(told.value).splitlines()
+        assert first == f"the bench of gain in {tmp_path} {said}"
+        assert lines == [f"  {line}" for line in text.splitlines()]

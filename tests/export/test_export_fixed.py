@@ -952,3 +952,20 @@ def test_a_number_that_is_beyond_a_word_is_told_wherever_it_stands(changes, why)
         f"controller 'PI' does not fit into words of 12 bits: {why}; give more bits (up to 32), or export single "
         "precision"
     )
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "free", "largest"),
+    [(-9.0, math.inf, 1.0, 9.0), (-math.inf, 3.0, -1.0, 3.0), (-2.0, 5.0, -7.0, 7.0), (-math.inf, math.inf, -0.5, 0.5)],
+)
+def test_a_command_has_a_range_of_four_times_the_farthest_limit_or_what_was_commanded(low, high, free, largest):
+    """Two actuators, and a target about each: of a kind all numbers have the range of the largest."""
+    of = SimpleNamespace(
+        actuators=2, minimum_v=low, maximum_v=high, forward=None, system=SimpleNamespace(C=np.zeros((4, 1)))
+    )
+    ideal = SimpleNamespace(
+        outputs=np.array([[0.25, -0.5, 1e-3, 2e-3], [0.0, 0.0, -6e-3, 0.0]]), free=np.array([[0.25, 0.0], [0.1, free]])
+    )
+    form = SimpleNamespace(C=np.zeros((4, 1)), A=np.eye(1), B=np.ones((1, 1)))
+    found = fixed_form._output_ranges(of, form, ideal, np.ones(1))
+    assert found.tolist() == pytest.approx([4.0 * largest, 4.0 * largest, 0.024, 0.024])

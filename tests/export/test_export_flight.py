@@ -29,7 +29,7 @@ from microrad.export.flight.stack import StackUse
 from microrad.export.flight.write import export_flight
 from microrad.export.linear_part.modes import minimal
 from microrad.export.linear_part.sections import sections
-from microrad.export.records import ExportError, FlightController, Origin, Signal
+from microrad.export.records import ExportError, FlightController, Origin, Signal, Vectors
 from microrad.export.templating import comment, real, render, table, terms
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
@@ -1642,3 +1642,83 @@ def test_the_share_that_code_may_differ_by_is_larger_with_any_exponent_that_is_n
         return SimpleNamespace(bouc_wen=rows)
 
     assert c_code.bound_share(SimpleNamespace(inverse=law(inverse), forward=law(forward))) == share
+
+
+# -------------------------------------------------------------------------------------- an export as it is asked for
+@pytest.fixture
+def parts_of_an_export(monkeypatch):
+    """What an export is made of in place of it; gives the list of what was asked for."""
+    of, asked = made_controller(), []
+    answers = {
+        "check_output": lambda folder, overwrite: asked.append(("folder", folder.name, overwrite)),
+        "promised": lambda chosen, accept: asked.append(("accept", accept)),
+        "flight_controller": lambda chosen: of,
+        "sections": lambda controller: SimpleNamespace(order=2, form="modal"),
+        "vectors": lambda chosen, samples: asked.append(("samples", samples)) or "run",
+        "within_limits": lambda controller, run: run,
+        "_code": lambda of, form, run, name, precision: (
+            asked.append((name, precision)) or ({}, "cost", None, None)
+        ),
+        "vectors_text": lambda controller, run: "",
+        "compiler": lambda: None,
+        "report_text": lambda found: "",
+    }  # fmt: skip
+    for name, answer in answers.items():
+        monkeypatch.setattr(flight_write, name, answer)
+    return asked
+
+
+def test_an_export_of_which_nothing_else_is_said_is_of_5000_samples_in_double_precision(tmp_path, parts_of_an_export):
+    source = choice.Source(tmp_path / "m.toml", made_controller().origin, None, 6.125)
+    found = export_flight(SimpleNamespace(source=source), tmp_path / "out")
+    name = "pi_uber_alles"
+    assert parts_of_an_export == [
+        *(("folder", "out", False), ("accept", False), ("samples", 5000), (name, "double")),
+    ]
+    assert (found.name, found.precision, found.samples) == (name, "double", 5000)
+
+
+@pytest.mark.parametrize("name", ["", "2nd"])
+def test_a_name_that_is_given_is_refused_before_anything_is_recorded_even_where_it_is_empty(
+    tmp_path, parts_of_an_export, name
+):
+    with pytest.raises(ExportError) as told:
+        export_flight(SimpleNamespace(), tmp_path / "out", name=name, overwrite=True)
+    assert str(told.value).startswith(f"{name!r} is no name for exported code: a name has letters")
+    assert parts_of_an_export == [("folder", "out", True), ("accept", False)]
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_report_of_fixed_point_ends_with_what_quantisation_does(monkeypatch):
+    monkeypatch.setattr(flight_write, "quantisation_text", lambda fixed: f"Of {fixed}.\nA table.")
+    lines = flight_write.report_text(made_export(precision="fixed", fixed="words", bound=None)).split("\n")
+    assert lines[0] == "pi_code: PI über alles in fixed point"
+    assert lines[-4:-2] == [
+        "  cycles        626 at worst, 302 in the median, of this machine's counter at 2.5 GHz",
+        "",
+    ] and lines[-2:] == ["Of words.", "A table."]
+    assert not [line for line in lines if line.startswith("  single")]
+
+
+@pytest.mark.parametrize("precision", ["double", "single", "fixed"])
+def test_each_precision_has_its_own_code_cost_and_bound(monkeypatch, precision):
+    for name in ("quantised", "fixed_code", "fixed_operations", "rounding_bound", "flight_code", "operations"):
+        monkeypatch.setattr(flight_write, name, lambda *given, name=name: (name, *given))
+    found = flight_write._code("of", "form", "run", "tip", precision)
+    bound, form = ("rounding_bound", "of", "form", "run"), ("quantised", "of", "form", "run")
+    assert found == {
+        "double": (("flight_code", "of", "form", "tip", "double", None), ("operations", "of", "form", "double"),
+                   None, None),
+        "single": (("flight_code", "of", "form", "tip", "single", bound), ("operations", "of", "form", "single"),
+                   bound, None),
+        "fixed": (("fixed_code", "of", "form", form, "tip"), ("fixed_operations", "of", form), None, form),
+    }[precision]  # fmt: skip
+
+
+def test_a_recorded_run_is_held_within_the_counts_that_the_code_can_give():
+    of = made_controller(minimum_v=-4.501, maximum_v=7.2519)
+    v = Vectors(np.array([[1.0, 2.0, 3.0]]), np.array([[-9.0, 1.0], [7.2515, -4.5005], [7.25, -4.5]]), 3, 4)
+    found = c_code.within_limits(of, v)
+    assert_allclose(found.commands, [[-4.5, 1.0], [7.25, -4.5], [7.25, -4.5]], rtol=1e-12)
+    assert (found.inputs is v.inputs, found.saturated, found.rate_clamped) == (True, 3, 4)
+    assert v.commands[0, 0] == -9.0, "the run itself stays as it is"

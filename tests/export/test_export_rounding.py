@@ -781,3 +781,18 @@ def test_a_bound_is_told_with_its_converter_and_its_growth_or_as_none(resolution
     none = "Over these 70 samples it is not bounded: errors may grow while commands are clipped."
     grows = "them that grows by 4.6e-08 V a sample."
     assert rounding._words(of, 1.2345e-3, largest, 4.56e-8, 70) == (said + grows if said else none)
+
+
+def test_a_bound_is_the_largest_of_two_actuators_and_grows_by_the_worse_of_them(monkeypatch):
+    """In counts of 0.01 V: 0.013 V ahead of the converter may be two of them behind it."""
+    of = SimpleNamespace(resolution_v=0.01, minimum_v=-4.0, maximum_v=3.0)
+    ahead = np.array([[0.003, 0.001], [0.002, 0.002], [0.0, 0.0], [0.004, 0.013], [0.005, 0.0], [0.0, 0.001]])
+    asked = []
+    monkeypatch.setattr(rounding, "errors_before_converter", lambda *given: asked.append(given) or ahead)
+    monkeypatch.setattr(rounding, "_words", lambda *given: given)
+    run = Vectors(np.zeros((6, 3)), np.zeros((6, 2)), 0, 0)
+    found = rounding.rounding_bound(of, "form", run)
+    assert asked == [(of, "form", run)]
+    assert found.command_v == pytest.approx(0.02 + 4.0 * rounding.UNIT * 4.0)
+    assert (found.samples, found.per_sample_v) == (6, pytest.approx(0.01 / 3.0))
+    assert found.words == (of, found.command_v, 0.013, found.per_sample_v, 6)
