@@ -26,9 +26,10 @@ from learning_loops import CREEP, PLAYS, in_series, loop_of, softened
 from microrad.core import kernels
 from microrad.export import choice
 from microrad.export.flight import c_code, double_run, learning_rounding, learning_run
+from microrad.export.flight import operations as operations_module
 from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
 from microrad.export.flight.fixed_form import readings
-from microrad.export.flight.operations import fixed_operations, operations
+from microrad.export.flight.operations import Operations, fixed_operations, operations
 from microrad.export.flight.rounding import UNIT, behind_converter, errors_before_converter, rounding_bound
 from microrad.export.linear_part.sections import sections
 from microrad.export.records import AdaptiveLaw
@@ -385,3 +386,66 @@ def test_a_bound_of_what_learns_is_six_times_the_rms_of_its_runs_by_sample_and_a
     np.testing.assert_allclose(found, [[18.0, 30.0], [36.0, 60.0]])
     readings_ = inputs.astype(np.float32).astype(float) if linear else outputs
     assert asked == [("of", "form"), *readings_.tolist()]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("beside", [False, True])
+def test_the_runs_of_a_bound_are_those_in_double_where_nothing_is_rounded(monkeypatch, kind, beside):
+    of, vectors = learning(samples=1500, **KINDS[kind])
+    monkeypatch.setattr(learning_rounding, "UNIT", 0.0)
+    monkeypatch.setattr(learning_rounding, "RUNS", 2)
+    monkeypatch.setattr(learning_rounding, "_in_single", lambda x: np.asarray(x, dtype=float))
+    monkeypatch.setattr(learning_rounding, "laws", lambda law, number: learning_run.laws(law))
+    form, inputs = sections(of), vectors.inputs[:900]
+    run = double_run.run_in_double(of, form, inputs)
+    found = learning_rounding.learning_errors(of, form, run, None if beside else inputs)
+    assert found.shape == (900, 2)
+    assert np.max(found) < 1e-9 * np.max(np.abs(run.free))
+
+
+def law_of(plays):
+    """Two actuators with so many plays, and rows of settings of which no two numbers are alike."""
+    settings = 0.1 + 0.01 * np.arange(2.0 * (max(SETTINGS.values()) + 1)).reshape(2, -1)
+    settings[:, kernels.CYCLE], settings[:, kernels.DELAY] = 20.0, 3.0
+    count = sum(plays)
+    return AdaptiveLaw(settings, np.zeros(count), np.arange(1.0, count + 1.0), np.array([0, plays[0], count]))
+
+
+SETTINGS = {
+    name: getattr(kernels, name.upper())
+    for name in (
+        *("cycle", "delay", "gain", "share", "keep", "dead_zone", "speed", "least_size", "least_travel"),
+        *("least_weight", "most_weight", "offset_limit"),
+    )
+}
+
+
+@pytest.mark.parametrize(
+    ("plays", "counts"),
+    [
+        ((5, 2), Operations(multiplications=36 + 4 + 7, additions=87 + 14 + 28, divisions=2, comparisons=20 + 6 + 14)),
+        ((2, 5), Operations(multiplications=34 + 4 + 7, additions=81 + 14 + 28, divisions=2, comparisons=20 + 6 + 14)),
+    ],
+)
+def test_of_two_actuators_the_second_learns_its_first_play_while_the_first_one_judges(plays, counts):
+    """Judging costs 4 n + 14 products and 12 n + 21 sums; a sample later a play takes 2 and 6 to learn."""
+    assert operations_module._learning(law_of(plays), 2) == counts
+
+
+def test_the_code_gets_the_slopes_and_settings_of_each_actuator():
+    law = law_of((2, 3))
+    found = c_code._adaptive_values(law)
+    assert found["slopes"].tolist() == [1.0, 3.0, 3.0, 7.0, 12.0]
+    assert (found["learners"], found["cycle"], found["reading_delay"]) == (5, 20, 3)
+    assert found["adaptive"] is law and (found["plays"], found["direct"]) == (0, False)
+    own = {name: column for name, column in SETTINGS.items() if name not in ("cycle", "delay", "keep")}
+    assert set(found["law"]) == {*own, "forgotten"} == set(found["settings"])
+    for name, column in own.items():
+        assert found["law"][name].tolist() == law.settings[:, column].tolist(), name
+    assert found["law"]["forgotten"].tolist() == (1.0 - law.settings[:, kernels.KEEP]).tolist()
+    assert found["shares"] == {
+        "TAKE_UP": kernels.TAKE_UP,
+        "KEEP_UP": kernels.KEEP_UP,
+        "SUSPECT": kernels.SUSPECT,
+    }
+    assert (found["bound_sigmas"], found["bound_runs"]) == (6.0, 64)

@@ -700,3 +700,15 @@ def test_a_name_that_is_refused_says_what_may_stand_in_its_place(name):
         identifier(name)
     assert str(error.value).startswith(f"{name!r} is no name for exported code: ")
     assert str(error.value).endswith(f"; take for example {suggested(name)!r}")
+
+
+def test_of_several_numbers_that_are_not_finite_the_first_by_matrix_and_row_is_named():
+    of = controller(np.diag([0.5, 0.25]), np.ones((2, 2)), np.ones((2, 2)), np.zeros((2, 2)), np.ones((2, 2)))
+    parts = {key: getattr(of.system, key).copy() for key in "ABCD"}
+    parts["C"][0, 0], parts["B"][1, 0], parts["B"][0, 1] = math.nan, math.nan, -math.inf
+    with pytest.raises(ExportError) as error:
+        modes_module.modes(replace(of, system=lti.StateSpace(*(parts[key] for key in "ABCD"))))
+    assert str(error.value) == (
+        "controller 'tried': B is -inf in row 0, column 1 (from 0); code cannot be made from a number that is not"
+        " finite: tune the controller anew, or mend its matrices"
+    )

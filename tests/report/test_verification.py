@@ -3788,3 +3788,23 @@ def test_published_figures_are_told_by_what_they_are_and_hold(of, figures):
     assert [(c.what, c.expected) for c in found] == [figure[1:] for figure in figures]
     assert [c.what for c, (name, *_) in zip(found, figures, strict=True) if not c.quantity.endswith(name)] == []
     assert all(c.holds and bool(c.quantity) is bool(name) for c, (name, *_) in zip(found, figures, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("held", "whole"), [((True, True), True), ((True, False), False), ((False, True), False), ((False,), False)]
+)
+def test_a_draw_holds_where_each_of_its_checks_does_with_the_values_that_were_drawn(monkeypatch, held, whole):
+    seen = []
+
+    def run_of(holds):
+        def made(of):
+            seen.append((of.data, of.given("communication.distance"), of.given("terminals.leo_aperture")))
+            yield a_comparison(1, 10.0 if holds else 20.0)
+            yield a_comparison(2, 20.0)
+
+        return made
+
+    asked = [replace(a_check(k, Referent.INDEPENDENT), run=run_of(holds)) for k, holds in enumerate(held)]
+    monkeypatch.setattr(workspace.Workspace, "links", None)
+    assert sweeps._held(asked, {"communication.distance": 0.5, "terminals.leo_aperture": 3.0}) is whole
+    assert seen and all(each == (None, pytest.approx(2.1e7), pytest.approx(0.15)) for each in seen)
