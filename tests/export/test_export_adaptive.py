@@ -403,12 +403,12 @@ def test_the_runs_of_a_bound_are_those_in_double_where_nothing_is_rounded(monkey
     assert np.max(found) < 1e-9 * np.max(np.abs(run.free))
 
 
-def law_of(plays):
-    """Two actuators with so many plays, and rows of settings of which no two numbers are alike."""
-    settings = 0.1 + 0.01 * np.arange(2.0 * (max(SETTINGS.values()) + 1)).reshape(2, -1)
+def law_of(*plays):
+    """Actuators with so many plays each, and rows of settings of which no two numbers are alike."""
+    settings = 0.1 + 0.01 * np.arange(float(len(plays) * (max(SETTINGS.values()) + 1))).reshape(len(plays), -1)
     settings[:, kernels.CYCLE], settings[:, kernels.DELAY] = 20.0, 3.0
     count = sum(plays)
-    return AdaptiveLaw(settings, np.zeros(count), np.arange(1.0, count + 1.0), np.array([0, plays[0], count]))
+    return AdaptiveLaw(settings, np.zeros(count), np.arange(1.0, count + 1.0), np.cumsum([0, *plays]))
 
 
 SETTINGS = {
@@ -429,14 +429,14 @@ SETTINGS = {
 )
 def test_of_two_actuators_the_second_learns_its_first_play_while_the_first_one_judges(plays, counts):
     """Judging costs 4 n + 14 products and 12 n + 21 sums; a sample later a play takes 2 and 6 to learn."""
-    assert operations_module._learning(law_of(plays), 2) == counts
+    assert operations_module._learning(law_of(*plays), 2) == counts
 
 
 def test_the_code_gets_the_slopes_and_settings_of_each_actuator():
-    law = law_of((2, 3))
+    law = law_of(2, 3, 1)
     found = c_code._adaptive_values(law)
-    assert found["slopes"].tolist() == [1.0, 3.0, 3.0, 7.0, 12.0]
-    assert (found["learners"], found["cycle"], found["reading_delay"]) == (5, 20, 3)
+    assert found["slopes"].tolist() == [1.0, 3.0, 3.0, 7.0, 12.0, 6.0]
+    assert (found["learners"], found["cycle"], found["reading_delay"]) == (6, 20, 3)
     assert found["adaptive"] is law and (found["plays"], found["direct"]) == (0, False)
     own = {name: column for name, column in SETTINGS.items() if name not in ("cycle", "delay", "keep")}
     assert set(found["law"]) == {*own, "forgotten"} == set(found["settings"])

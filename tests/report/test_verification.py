@@ -3808,3 +3808,30 @@ def test_a_draw_holds_where_each_of_its_checks_does_with_the_values_that_were_dr
     monkeypatch.setattr(workspace.Workspace, "links", None)
     assert sweeps._held(asked, {"communication.distance": 0.5, "terminals.leo_aperture": 3.0}) is whole
     assert seen and all(each == (None, pytest.approx(2.1e7), pytest.approx(0.15)) for each in seen)
+
+
+def test_credibility_counts_three_measurements_and_two_published_outputs_that_hold():
+    kinds = (Referent.PUBLISHED, *[Referent.MEASUREMENT] * 3, Referent.PUBLISHED, Referent.INDEPENDENT)
+    outcomes = [check.Outcome(a_check(k, kind), (a_comparison(1, 10.0),)) for k, kind in enumerate(kinds)]
+    outcomes += [check.Outcome(a_check(6, Referent.MEASUREMENT), (), absent="not here")]
+    v = findings.found(outcomes, WHOLE, full=False, domains={})
+    (argued,) = [f for f in v.factors if f.name == "Validation"]
+    assert "published output (2) and with measurements (3)" in argued.reason and argued.level == 1
+    assert page.summary(v)[1].startswith("5 named comparisons are with measurements or with what others")
+    missed = check.Outcome(a_check(7, Referent.MEASUREMENT), (a_comparison(1, 99.0),))
+    (argued,) = [f for f in replace(v, outcomes=[*outcomes, missed]).factors if f.name == "Validation"]
+    assert "published output (2) and with measurements (3)" in argued.reason and argued.level == 0
+
+
+def test_a_relay_of_two_terminals_serves_three_satellites_in_turn():
+    given = {**SERVED, "constellation.terminals": 2}
+    views = [(satellite, 0, 0.0, 30.0) for satellite in range(3)]
+    served = operation._Relays(given.__getitem__, views, 1)
+    for now in (0.0, 10.0, 20.0, 30.0):
+        served.step(now)
+    first, second, third = (0.0, 10.0), (10.0, 20.0), (20.0, 30.0)
+    assert sorted(served.sessions) == sorted(
+        [(0, 0, *first), (1, 0, *first), (2, 0, *second), (0, 0, *second), (1, 0, *third), (2, 0, *third)]
+    )
+    assert served.had == dict.fromkeys(range(3), 20.0 - 2.0 * SERVED["constellation.overhead"])
+    assert served.busy == []
