@@ -4,6 +4,7 @@ import math
 import os
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -712,3 +713,60 @@ def test_of_several_numbers_that_are_not_finite_the_first_by_matrix_and_row_is_n
         "controller 'tried': B is -inf in row 0, column 1 (from 0); code cannot be made from a number that is not"
         " finite: tune the controller anew, or mend its matrices"
     )
+
+
+def test_a_state_has_the_sign_of_the_output_that_shows_it_most_and_a_pair_that_of_its_first_state():
+    shown = np.array([[1.0, -5.0, 2.0, 0.0, 2.0, 3.0], [-3.0, 4.0, -1.0, 0.0, -2.0, 1.0]], dtype=np.longdouble)
+    assert parting._signs(shown, (1, 2, 1, 2)).tolist() == [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]
+    assert parting._signs(-shown, (2, 3, 1)).tolist() == [1.0, 1.0, -1.0, 1.0, -1.0, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "groups"),
+    [
+        ([[[0.5]], rotation(0.3, 0.8), [[0.5]], rotation(0.3, 0.8), [[0.9]]], [[0, 3], [1, 2, 4, 5], [6]]),
+        ([[[0.5]], [[0.9]], [[0.7]], [[0.5, 1.0], [0.0, 0.9]]], [[0, 1, 3, 4], [2]]),
+        ([[[0.5]], [[0.5 + 2e-7]], [[0.5 + 2e-8]]], [[0, 2], [1]]),
+    ],
+)
+def test_blocks_that_share_a_pole_are_looked_at_together_also_through_a_third_one(blocks, groups):
+    sizes = tuple(len(each) for each in blocks)
+    whole = np.zeros((sum(sizes), sum(sizes)))
+    for at, each in zip(parting.slices(sizes), blocks, strict=True):
+        whole[at, at] = each
+    found = modes_module._alike(SimpleNamespace(slices=parting.slices(sizes), blocks=whole))
+    assert sorted(sorted(group.tolist()) for group in found) == groups
+
+
+@pytest.mark.parametrize(
+    ("C", "times"),
+    [([[1.0, 1.0]], 5.0), ([[1.0, 0.0], [1.0, 1.0]], 5.0), ([[0.0, 0.0], [1.0, -1.0]], 1.0), ([[0.0, 0.0]], 1.0)],
+)
+def test_blocks_cancel_by_what_they_add_over_what_is_left_of_the_worst_output(C, times):
+    """At frequency 0 the poles 0.5 and 0.25 add 2 and 4 / 3, of which their difference leaves 2 / 3."""
+    found = SimpleNamespace(blocks=np.diag([0.5, 0.25]), slices=parting.slices((1, 1)))
+    of = SimpleNamespace(found=found, C=np.array(C), driven=np.array([[1.0], [-1.0]]))
+    assert modes_module._cancellation(of) == pytest.approx(times, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("own", "others", "fetched"),
+    [
+        ([[0.5]], ([[0.9]], [[-0.5]], [[0.52]]), [0.52]),
+        ([[0.5]], (rotation(0.2, 0.5), [[0.3]], [[0.9]]), [0.5 * np.exp(-0.2j), 0.5 * np.exp(0.2j)]),
+        (rotation(0.7, 0.8), ([[0.8 * np.cos(0.7)]], rotation(0.75, 0.78)), 0.78 * np.exp([-0.75j, 0.75j])),
+    ],
+)
+def test_the_pole_nearest_to_those_of_a_block_is_moved_behind_it(own, others, fetched):
+    """Far from the real axis a pair is nearer to a pair than a real pole of the same real part is."""
+    sizes = tuple(len(each) for each in (own, *others))
+    T = np.triu(np.full((sum(sizes), sum(sizes)), 0.25))
+    for at, each in zip(parting.slices(sizes), (own, *others), strict=True):
+        T[at, at] = each
+    end = len(own)
+    moved, Q = parting._fetch(T.copy(), np.eye(len(T)), 0, end)
+    np.testing.assert_allclose(Q @ moved @ Q.T, T, atol=1e-12)
+    np.testing.assert_allclose(moved[:end, :end], own, atol=1e-12)
+    at = slice(end, end + len(fetched))
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(moved[at, at])), np.sort_complex(fetched), atol=1e-12)
+    assert not moved[end + len(fetched) :, at].any()
