@@ -3835,3 +3835,17 @@ def test_a_relay_of_two_terminals_serves_three_satellites_in_turn():
     )
     assert served.had == dict.fromkeys(range(3), 20.0 - 2.0 * SERVED["constellation.overhead"])
     assert served.busy == []
+
+
+@pytest.mark.parametrize(
+    ("waits", "least", "most"), [([100.0], 200.0, 200.0), ([math.inf], 0.0, 0.0), ([100.0, math.inf], 0.0, 200.0)]
+)
+def test_volumes_of_a_day_leave_out_what_is_waited_and_contacts_that_are_shorter(monkeypatch, waits, least, most):
+    """Contacts of 300 s and 50 s, of which a wait of 100 s leaves 200 s and nothing; two runs in a set."""
+    asked = []
+    monkeypatch.setattr(operation, "acquisitions", lambda of, count: asked.append(count) or np.array(waits))
+    given = {"operations.runs": 2.0, "communication.data_rate": 1e6}.__getitem__
+    found = operation._volumes(given, np.array([300.0, 50.0]))
+    assert found.shape == (4000, 2) and asked == [100_000]
+    assert (found.min(), found.max()) == (1e6 * least, 1e6 * most)
+    assert np.all(found[:, 0] <= found[:, 1]) and bool(np.any(found[:, 0] < found[:, 1])) is (least < most)
