@@ -956,7 +956,13 @@ def test_a_number_that_is_beyond_a_word_is_told_wherever_it_stands(changes, why)
 
 @pytest.mark.parametrize(
     ("low", "high", "free", "largest"),
-    [(-9.0, math.inf, 1.0, 9.0), (-math.inf, 3.0, -1.0, 3.0), (-2.0, 5.0, -7.0, 7.0), (-math.inf, math.inf, -0.5, 0.5)],
+    [
+        (-9.0, math.inf, 1.0, 9.0),
+        (-math.inf, 3.0, -1.0, 3.0),
+        (-2.0, 5.0, -7.0, 7.0),
+        (-math.inf, math.inf, -0.75, 0.75),
+        (-math.inf, math.inf, 0.125, 0.5),
+    ],
 )
 def test_a_command_has_a_range_of_four_times_the_farthest_limit_or_what_was_commanded(low, high, free, largest):
     """Two actuators, and a target about each: of a kind all numbers have the range of the largest."""

@@ -728,6 +728,8 @@ def test_of_zeros_beside_a_pole_one_of_its_own_kind_goes_with_it():
     assert real.zeros.frequencies_hz == (100.0, 99.0, 102.0)
     assert pair.zeros.frequencies_hz == (101.0, 99.0, 102.0)
     assert real.delay_s == pair.delay_s == 1e-4
+
+
 @pytest.mark.parametrize(("period", "length_s"), [(50, 0.1), (None, 0.4)])
 def test_a_pole_is_shown_by_a_period_of_what_repeats_and_else_by_a_whole_record(monkeypatch, period, length_s):
     """Two records of 200 samples at 500 Hz, and what the problem of their poles is made of."""

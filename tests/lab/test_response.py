@@ -470,6 +470,8 @@ def test_periods_that_are_missing_or_too_few_are_told_in_full():
         "a: 70 samples hold 4 periods of 16, and 4 are to be dropped as transient; drop none or more and keep at least "
         "one, or record more periods."
     )
+    unlike = [drawn(80, 1, 1, 1, period=16, name="a"), drawn(32, 1, 1, 2, period=16, name="b"), records[2]]
+    assert told(response_from_periods, unlike, skip_periods=2).startswith("b: 32 samples hold 2 periods of 16, and 2 ")
     two = [drawn(40, 2, 1, seed, period=32) for seed in (1, 2)]
     assert told(response_from_periods, two) == (
         "2 records of one usable period for 2 inputs leave nothing to estimate the confidence from; give more "

@@ -1588,3 +1588,17 @@ def test_springs_begin_with_the_records_of_the_largest_and_of_the_middle_amplitu
         expected = response_from_periods([records[k] for k in (0, 3, 6)], skip_periods=1)
         np.testing.assert_allclose(response.response, expected.response)
         np.testing.assert_allclose(response.standard_error, expected.standard_error)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e4])
+def test_where_the_error_falls_with_the_amplitude_as_much_is_left_as_the_fit_leaves_whatever_the_unit(unit):
+    """4, 2 and 0.5 um at amplitudes of 1, 2 and 4: their geometric mean."""
+    none = np.zeros((0, 0))
+    own = Mirror(
+        *("one", none, np.zeros((0, 1)), np.zeros((0, 1)), np.zeros((1, 0)), np.eye(1)),
+        *(np.zeros((1, 0)), np.zeros((1, 1)), np.ones((1, 1)), (), (PrandtlIshlinskii((0.0,), (1.0,)),), ()),
+    )
+    fit = SimpleNamespace(mirror=own, classes=(0, 1, 2), amplitudes=(unit, 2 * unit, 4 * unit), motion=np.array([unit]))
+    fit.error_rms, fit.rate_hz, fit.sub_steps, fit.delay_s = 1e-6 * np.array([4.0, 2.0, 0.5]), 100.0, 1, 0.0
+    drive = 9.0 * unit * np.sin(2 * np.pi * np.arange(32) / 32)[:, None]
+    assert trust(fit, drive).left == pytest.approx(1e-6 * 4.0 ** (1 / 3), rel=1e-9)

@@ -186,7 +186,7 @@ def _output_ranges(of: FlightController, form: Sections, ideal: Run, inputs: Flo
     first = np.cumsum([0, *sizes[:-1]])
     peaks = np.maximum.reduceat(np.max(np.abs(ideal.outputs), axis=0), first)
     limits = [abs(x) for x in (of.minimum_v, of.maximum_v) if math.isfinite(x)]
-    peaks[0] = max(*limits, peaks[0], float(np.max(np.abs(ideal.free)))) if limits else np.max(np.abs(ideal.free))
+    peaks[0] = max(*limits, peaks[0], float(np.max(np.abs(ideal.free))))
     groups = _or_reachable(peaks * HEAD_ROOM, form.C[first], form, inputs)
     return np.repeat(groups, sizes)
 

@@ -443,10 +443,11 @@ def _period(records: Sequence[Recording]) -> int:
 
 def _periods(records: Sequence[Recording], name: str, period: int, skip: int) -> Complexes:
     """Transforms of each whole period behind the first `skip`, shape (records, periods, lines, channels)."""
-    count = min(r.samples // period for r in records) - skip
+    shortest = min(records, key=lambda r: r.samples)
+    count = shortest.samples // period - skip
     if skip < 0 or count < 1:
         raise IdentificationError(
-            f"{records[0].path}: {records[0].samples} samples hold {records[0].samples // period} periods of {period}, "
+            f"{shortest.path}: {shortest.samples} samples hold {shortest.samples // period} periods of {period}, "
             f"and {skip} are to be dropped as transient; drop none or more and keep at least one, or record more "
             "periods."
         )

@@ -163,9 +163,9 @@ def trust(fit: HystereticStiffnessFit, drive: Floats) -> Trust:
     ends = (coupled.response(m, drive, fit.rate_hz, fine * fit.sub_steps, fit.delay_s) for m in (own, further))
     opened = float(np.sqrt(np.mean(np.subtract(*ends) ** 2)))
     errors = [float(np.sqrt(np.mean(fit.error_rms[classes == c] ** 2))) for c in range(len(fit.amplitudes))]
-    power, level = np.polyfit(np.log(fit.amplitudes), np.log(errors), 1)
+    power = max(float(np.polyfit(np.log(fit.amplitudes), np.log(errors), 1)[0]), 0.0)
     amplitude = float(np.sqrt(np.mean(np.var(drive, axis=0))))
-    left = math.exp(level) * amplitude ** max(float(power), 0.0)
+    left = amplitude**power * math.exp(np.mean(np.log(errors)) - power * np.mean(np.log(fit.amplitudes)))
     return Trust(float((largest / fit.motion).max()), math.hypot(left, opened), left, opened)
 
 
