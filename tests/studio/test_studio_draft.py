@@ -980,3 +980,41 @@ def test_a_file_that_is_in_order_once_it_is_looked_at_again_is_to_be_opened_agai
     with pytest.raises(DraftError) as refusal:
         Draft.open(tmp_path / "m.toml")
     assert str(refusal.value) == f"{tmp_path / 'm.toml'} changed while it was read; open it again"
+
+
+def test_a_number_is_kept_with_the_digits_that_were_typed(draft):
+    key = "pointing.confidence"
+    for typed in ("0.9970", "0.99700000000000000001"):
+        assert draft.set(key, "0.997").set(key, typed).values[key].raw == typed
+    assert draft.set(key, "0.997").set(key, " 0.997 ").values[key].raw == "0.997"
+
+
+@pytest.mark.parametrize(("less", "opens"), [(0, True), (1, False)])
+def test_a_file_of_just_the_most_bytes_is_opened_and_one_more_is_too_many(draft, monkeypatch, less, opens):
+    monkeypatch.setattr(drafts, "MAX_BYTES", draft.path.stat().st_size - less)
+    if opens:
+        assert Draft.open(draft.path) == draft
+        return
+    with pytest.raises(DraftError, match=r"m\.toml changed while it was read; open it again"):
+        Draft.open(draft.path)
+
+
+@pytest.mark.parametrize("letters", [8, 119, 121, 300])
+def test_a_key_of_any_length_has_its_fault_beside_it_and_is_named_in_few_letters(draft, letters):
+    """Faults are of the key as it is shown: one of more than 120 letters by its first 60."""
+    name = "k" * letters
+    found = draft.with_text(draft.text.replace("[terminals]\n", f"[terminals]\n{name} = 1\n")).values[
+        f"terminals.{name}"
+    ]
+    shown = f"terminals.{name}" if letters < 110 else f"terminals.{'k' * 50}…"
+    assert [fault.key for fault in found.problems] == [shown]
+    with pytest.raises(DraftError) as refusal:
+        draft.set(f"terminals.{name}", "1")
+    assert str(refusal.value).startswith(f"{shown} is no key of [terminals], which has leo_aperture, ")
+
+
+@pytest.mark.parametrize("typed", ["a # b", "c", "'#'"])
+def test_a_text_with_a_sign_of_comments_in_it_is_changed_like_any_other(tmp_path, typed):
+    draft = Draft('name = "x # y" # why # not\n', tmp_path / "m.toml", ())
+    written = typed if typed.startswith("'") else f'"{typed}"'
+    assert draft.set("name", typed).text == f"name = {written} # why # not\n"

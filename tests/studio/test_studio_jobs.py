@@ -1197,3 +1197,55 @@ def test_a_list_is_shown_while_the_disk_is_full(studio, tmp_path, monkeypatch):
 
     monkeypatch.setattr(jobs_module, "start_waiting", full)
     assert [job.state for job in studio.listed()] == ["queued"]
+
+
+def test_the_process_of_a_job_hears_signals_and_its_command_is_not_deaf_to_them(monkeypatch, tmp_path):
+    """A handler that does nothing: what is ignored stays ignored in the processes that are started."""
+    handlers, ran = {}, []
+    monkeypatch.setattr(jobs_process.signal, "signal", handlers.__setitem__)
+    monkeypatch.setattr(jobs_process.os, "nice", ran.append)
+    monkeypatch.setattr(jobs_process, "run_job", ran.append)
+    monkeypatch.setattr(jobs_process, "start_waiting", ran.append)
+    monkeypatch.setattr(sys, "argv", ["x", str(tmp_path / "3"), "more"])
+    jobs_process.main()
+    assert {*handlers} == {signal.SIGINT, signal.SIGTERM}
+    assert not {*handlers.values()} & {signal.SIG_IGN, signal.SIG_DFL}
+    assert [handler(number, None) for number, handler in handlers.items()] == [None, None]
+    assert ran == [5, tmp_path / "3", tmp_path]
+
+
+@pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("3", "3")])
+def test_a_command_has_one_thread_of_linear_algebra_unless_the_user_has_set_another_number(monkeypatch, given, threads):
+    seen = []
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", given or "")
+    if given is None:
+        monkeypatch.delenv("OPENBLAS_NUM_THREADS")
+    monkeypatch.setattr(worker, "die_with_parent", lambda number: True)
+    monkeypatch.setattr(command, "_taken_stdin", lambda: 9)
+    monkeypatch.setattr(
+        command.runpy, "run_module", lambda *of, **how: seen.append((of, how, os.environ["OPENBLAS_NUM_THREADS"]))
+    )
+    monkeypatch.setattr(sys, "argv", ["command", "12", "presets"])
+    command.main()
+    assert seen == [(("microrad",), {"run_name": "__main__", "alter_sys": True}, threads)]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the numbers of open files are those of POSIX")
+def test_the_pipe_at_the_input_of_a_command_is_kept_and_its_input_is_empty():
+    own, (read, write) = os.dup(0), os.pipe()
+    try:
+        os.dup2(read, 0)
+        os.write(write, b"watched")
+        free = [os.dup(0), os.dup(0)]
+        for number in free:
+            os.close(number)
+        pipe, following = command._taken_stdin(), os.dup(0)
+        assert os.read(0, 10) == b""
+        assert os.read(pipe, 10) == b"watched"
+        for number in (pipe, following):
+            os.close(number)
+        assert [pipe, following] == free  # nothing else was left open
+    finally:
+        os.dup2(own, 0)
+        for number in (own, read, write):
+            os.close(number)

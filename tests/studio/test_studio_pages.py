@@ -3079,3 +3079,38 @@ def test_a_late_refusal_of_an_older_question_is_dropped_as_a_late_answer_is(sess
     )
     asyncio.run(both())
     assert (controls.fault.text, controls.state.text, behind(controls)) == ("", "", set())
+
+
+def test_a_study_of_a_file_that_another_program_has_changed_or_removed_is_not_run(session, tab, asked, told):
+    study = runs._Study(session)
+    study.folder.value = "out"
+    path = session.draft.path
+    name = session.name_of(path)
+    path.write_text(f"{TEXT}\n# of another program\n", "utf-8")
+    study._look()
+    changed = study.fault.text
+    assert changed.startswith(f"{name} was changed on disk by another program") and not study.button.enabled
+    asyncio.run(study._run())
+    path.unlink()
+    asyncio.run(study._run())
+    assert (study.fault.text, asked.orders, told) == (f"{name} is not on disk any more; save it again", [], [])
+    path.write_text(session.draft.text, "utf-8")
+    study._look()
+    assert (study.fault.text, study.button.enabled) == ("", True)
+
+
+def test_figures_that_were_hidden_stay_hidden_while_their_campaign_goes_on(session, cards):
+    (session.folder / "x.ledger").touch()
+    job = Job(2, session.folder, "running", "campaign", "t", ("campaign",), session.folder, ("x.ledger",))
+    card = shown(runs_jobs._Card(cards, job), job, Others(newest=True, latest=True))
+    panel = card._panel
+    card._toggle()
+    for more in (
+        {"progress": Progress(3, 4, "rows")},
+        {"progress": Progress(4, 4, "rows"), "state": "done", "code": 0},
+    ):
+        shown(card, replace(job, **more), Others(newest=True, latest=True))
+        assert (panel.open, card.figures.text) == (False, "Show its figures")
+    assert card._panel is panel and texts(card.place).count("No row is in the ledger yet.") == 1
+    card._toggle()
+    assert (panel.open, card.figures.text) == (True, "Hide its figures")

@@ -518,3 +518,26 @@ def test_a_job_is_run_in_a_folder_alone(jobs, tmp_path):
         words = "is no folder to run a job in; choose another working folder"
         assert str(refusal.value) == f"{tmp_path / place} {words}"
     assert jobs_files.job_folders(jobs.folder) == []
+
+
+def test_of_jobs_that_wait_each_is_started_as_soon_as_the_one_before_it_is_over(jobs, started):
+    """They end at once: one look at the queue starts all of them, the oldest first."""
+    three, one, two = (written(jobs.folder, number) for number in (3, 1, 2))
+    (two / "cancel").touch()
+    jobs_process.start_waiting(jobs.folder)
+    assert started == [one, three]
+    assert [job.state for job in jobs.listed()] == ["done", "cancelled", "done"]
+    assert started == [one, three]
+
+
+@pytest.mark.parametrize("note", ["[1]", "7", '"running"', "null", "true"])
+def test_a_note_that_holds_anything_but_a_table_says_nothing(jobs, note):
+    folder = written(jobs.folder)
+    (folder / "started.json").write_text(note, "utf-8")
+    job = jobs.get(1)
+    assert (job.state, job.started, job.progress) == ("lost", "", None)
+    jobs_files.note(folder / "started.json")
+    (folder / "exit.json").write_text(note, "utf-8")
+    job = jobs.get(1)
+    assert (job.state, job.code, job.ended) == ("failed", None, "")
+    assert job.words == "it ended without an exit code and said nothing"

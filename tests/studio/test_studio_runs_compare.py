@@ -1129,3 +1129,16 @@ def test_a_campaign_file_that_cannot_be_looked_at_names_no_mission(session):
     path = session.folder / "c.toml"
     path.write_text('mission = "mission.toml"\n', encoding="utf-8")
     assert runs_view._names_a_mission(path) and not runs_view._names_a_mission(session.folder / "gone.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "time_s"), [('version = "m.toml"\n', 2e9), ('versions = "m.toml"\n', 1e9), ("# version 3", 3e9)]
+)
+def test_a_campaign_file_that_becomes_another_is_read_anew(session, text, time_s):
+    """Of the same size at another time, of another size at the same time, and of both."""
+    path = session.folder / "c.toml"
+    for content, seconds, names in (('mission = "m.toml"\n', 1e9, True), (text, time_s, False)):
+        path.write_text(content, "utf-8")
+        os.utime(path, (seconds, seconds))
+        assert runs_view._names_a_mission(path) is names
+    assert runs_view.campaign_files(session) == ()

@@ -1032,3 +1032,65 @@ def test_a_mission_in_an_inner_folder_is_the_one_that_is_gone_on_with(file):
     inner.unlink()
     again.save()
     assert '"6 cm"' in inner.read_text("utf-8") and '"6 cm"' not in file.read_text("utf-8")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere an address is not used again")
+@pytest.mark.parametrize("refused", [None, "bind", "listen"])
+def test_a_port_is_bound_and_listened_on_or_its_socket_is_closed(monkeypatch, refused):
+    done = []
+
+    class Socket:
+        def __init__(self, *kind):
+            done.append(kind)
+
+        def __getattr__(self, name):
+            def act(*given):
+                done.append((name, *given))
+                if name == refused:
+                    raise OSError(errno.EACCES, "Permission denied")
+
+            return act
+
+    places = [(10, 1, 6, "", ("::1", 81, 0, 0)), (2, 1, 6, "", ("127.0.0.1", 81))]
+    monkeypatch.setattr(server.socket, "getaddrinfo", lambda *asked, **more: done.append((asked, more)) or places)
+    monkeypatch.setattr(server.socket, "socket", Socket)
+    whole = [
+        (("lab", 81), {"type": socket.SOCK_STREAM}),
+        (10, 1, 6),
+        ("setsockopt", socket.SOL_SOCKET, socket.SO_REUSEADDR, 1),
+        ("bind", ("::1", 81, 0, 0)),
+        ("listen",),
+    ]
+    if refused is None:
+        assert isinstance(server._bound("lab", 81), Socket)
+        assert done == whole
+        return
+    with pytest.raises(server.StudioError) as refusal:
+        server._bound("lab", 81)
+    assert str(refusal.value) == "port 81 is not open to this user; give one from 1024 on with --port"
+    assert done == [*whole[: 5 if refused == "listen" else 4], ("close",)]
+
+
+@pytest.mark.parametrize("letters", [100, 300])
+def test_a_name_that_no_host_can_have_is_told_by_its_first_letters(letters):
+    with pytest.raises(server.StudioError) as refusal:
+        server._bound("a" * letters, 81)
+    shown = "a" * min(letters, 120)
+    assert str(refusal.value) == f"'{shown}' is no address of this machine; give one such as 192.168.1.7"
+
+
+def test_a_result_in_an_inner_folder_is_saved_by_its_own_name(file):
+    pytest.importorskip("starlette")
+    session = Session(file.parent)
+    (file.parent / "out").mkdir()
+    for name in ("results.nc", "report.html", "odd.HTML", "html"):
+        (file.parent / "out" / name).write_text(name, "utf-8")
+    results = ("out/results.nc", "out/report.html", "out/odd.HTML", "out/html")
+    written(session.jobs.folder, 3, cwd=str(file.parent), results=results)
+    show = server._documents(session)
+    found = [(str(each.path), each.headers["content-disposition"]) for each in (show(3, place) for place in range(4))]
+    ways = ("attachment", "inline", "attachment", "attachment")
+    assert found == [
+        (str(file.parent / name), f'{way}; filename="{Path(name).name}"')
+        for name, way in zip(results, ways, strict=True)
+    ]
