@@ -1249,3 +1249,157 @@ def test_the_pipe_at_the_input_of_a_command_is_kept_and_its_input_is_empty():
         os.dup2(own, 0)
         for number in (own, read, write):
             os.close(number)
+
+
+def test_a_job_that_ends_just_as_it_is_looked_at_is_no_lost_one(tmp_path, monkeypatch):
+    """Its process drops the lock behind the note of its end."""
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
+    jobs_files.note(folder / "started.json")
+    asked = []
+
+    def ends(path):
+        asked.append(path)
+        jobs_files.note(folder / "exit.json", code=0)
+        return False
+
+    monkeypatch.setattr(jobs_files, "is_held", ends)
+    job = jobs_files.read_job(folder)
+    assert (job.state, job.code, asked) == ("done", 0, [folder / "alive"])
+
+
+@pytest.mark.parametrize("error", [ProcessLookupError(3, "No such process"), PermissionError(1, "not permitted")])
+def test_a_signal_to_a_command_that_is_gone_is_no_fault(monkeypatch, error):
+    asked = []
+
+    def gone(*where):
+        asked.append(where)
+        raise error
+
+    command = SimpleNamespace(pid=7, send_signal=gone)
+    monkeypatch.setattr(jobs_process.os, "killpg", gone)
+    jobs_process._signal(command, 2)
+    monkeypatch.delattr(jobs_process.os, "killpg")
+    jobs_process._signal(command, 15)
+    assert asked == [(7, 2), (15,)]
+
+
+def test_windows_has_a_group_of_processes_without_a_window_and_a_signal_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(jobs_process, "os", SimpleNamespace(name="nt"))
+    for name, value in (("CREATE_NEW_PROCESS_GROUP", 0x200), ("CREATE_NO_WINDOW", 0x08000000)):
+        monkeypatch.setattr(jobs_process.subprocess, name, value, raising=False)
+    assert jobs_process.apart() == {"creationflags": 0x08000200}
+    sent, waited = [], []
+
+    def wait(patience_s=None):
+        waited.append(patience_s)
+        if patience_s is not None:
+            raise subprocess.TimeoutExpired("x", patience_s)
+        return 1
+
+    monkeypatch.setattr(jobs_process, "signal", SimpleNamespace(CTRL_BREAK_EVENT=1, SIGINT=2, SIGTERM=15))
+    monkeypatch.setattr(jobs_process, "_signal", lambda command, number: sent.append(number))
+    (tmp_path / "cancel").touch()
+    assert jobs_process._ended(SimpleNamespace(wait=wait), tmp_path / "cancel", (1.5, 2.5), 0.25) == 1
+    assert (sent, waited) == ([1, 15, 15], [1.5, 2.5, None])
+
+
+def test_a_command_that_nobody_stops_is_waited_for_in_small_steps(tmp_path, monkeypatch):
+    waited = []
+
+    def wait(patience_s):
+        waited.append(patience_s)
+        if len(waited) < 4:
+            raise subprocess.TimeoutExpired("x", patience_s)
+        return 7
+
+    monkeypatch.setattr(jobs_process, "_signal", lambda command, number: waited.append("a signal"))
+    assert jobs_process._ended(SimpleNamespace(wait=wait), tmp_path / "cancel", (1.5, 2.5), 0.25) == 7
+    assert waited == [0.25] * 4
+
+
+@pytest.mark.parametrize(
+    ("more", "how"),
+    [({}, ((30.0, 30.0), 0.2)), ({"waits_s": (1.0, 2.0), "look_s": 0.5}, ((1.0, 2.0), 0.5))],
+)
+def test_the_command_of_a_job_is_watched_with_its_streams_and_its_end_is_noted(waiting_job, monkeypatch, more, how):
+    class Command:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            seen.append("left")
+
+    seen, made = [], Command()
+
+    def start(job, program, out, errors):
+        seen.append((job.number, job.arguments, program, *((each.name, each.mode) for each in (out, errors))))
+        return made
+
+    def end(*watched):
+        seen.append(watched)
+        assert noted(waiting_job) == ["started.json", "stderr", "stdout"] and jobs_files.is_held(waiting_job / "alive")
+        return -15
+
+    monkeypatch.setattr(jobs_process, "_command", start)
+    monkeypatch.setattr(jobs_process, "_ended", end)
+    jobs_process.run_job(waiting_job, **more)
+    streams = [(str(waiting_job / name), "ab") for name in ("stdout", "stderr")]
+    assert seen == [
+        (1, ("presets",), jobs_process._program(), *streams),
+        (made, waiting_job / "cancel", *how),
+        "left",
+    ]
+    assert json.loads((waiting_job / "started.json").read_text("utf-8"))["pid"] == os.getpid()
+    job = jobs_files.read_job(waiting_job)
+    assert (job.state, job.code) == ("failed", -15)
+
+
+def test_a_lock_is_free_again_behind_an_error(tmp_path):
+    path = tmp_path / "lock"
+    with pytest.raises(KeyError), jobs_files.held(path, 0.0) as mine:
+        assert mine and jobs_files.is_held(path)
+        raise KeyError("x")
+    assert not jobs_files.is_held(path)
+    with jobs_files.held(path, 0.0) as mine:
+        assert mine
+
+
+ROOM = "check free space and permissions"
+
+
+@pytest.mark.parametrize(
+    ("of", "name", "do", "words"),
+    [
+        (jobs_module, "new_folder", lambda jobs, new: jobs.submit(new), "{jobs}: No space left on device; " + ROOM),
+        (Path, "touch", lambda jobs, new: jobs.cancel(1), "job 1 cannot be asked to stop: {jobs}/1: {why}; " + ROOM),
+        (shutil, "rmtree", lambda jobs, new: jobs.remove(2), "job 2 cannot be removed: {jobs}: {why}; " + ROOM),
+    ],
+)
+def test_what_the_disk_does_not_take_is_told_with_its_place(studio, tmp_path, monkeypatch, of, name, do, words):
+    monkeypatch.setattr(jobs_module, "start_waiting", lambda folder: None)
+    for number in (1, 2):
+        written(studio.folder, number, cwd=str(tmp_path))
+    for note in ("started", "exit"):
+        jobs_files.note(studio.folder / "2" / f"{note}.json", code=0)
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(of, name, full)
+        with pytest.raises(JobError) as refusal:
+            do(studio, order(tmp_path, "presets"))
+    assert str(refusal.value) == words.format(jobs=studio.folder, why="No space left on device")
+    assert [(job.number, job.state) for job in studio.listed()] == [(2, "done"), (1, "queued")]
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), JobError("the lock is none")])
+def test_a_job_that_cannot_be_started_yet_waits_in_the_queue(studio, tmp_path, monkeypatch, error):
+    def refuse(folder):
+        raise error
+
+    monkeypatch.setattr(jobs_module, "start_waiting", refuse)
+    found = [studio.submit(order(tmp_path, "presets", title=title)) for title in ("one", "two")]
+    assert [(job.number, job.title, job.state) for job in found] == [(1, "one", "queued"), (2, "two", "queued")]
+    shutil.rmtree(studio.folder / "1")
+    shutil.rmtree(studio.folder / "2")
