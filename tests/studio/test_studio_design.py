@@ -1409,3 +1409,33 @@ def test_two_questions_of_one_owner_are_apart_by_their_names():
     day, other = shared(owner, "day"), shared(owner, "links")
     assert day is not other
     assert (shared(owner, "day"), shared(owner, "links")) == (day, other)
+
+
+@pytest.mark.parametrize("ends", ["answer", "progress", "refusal", "fault", "memory"])
+def test_a_question_that_is_asked_again_has_nothing_of_the_one_that_was_cancelled(ends):
+    """The same question: its first thread still works, and whatever becomes of it is dropped."""
+    latest, begun, go = Latest(), threading.Event(), threading.Event()
+    raised = {"refusal": ValueError("old"), "fault": KeyError("old"), "memory": MemoryError()}
+
+    def old(progress):
+        begun.set()
+        go.wait(HANG_S)
+        if ends == "progress":
+            progress(1, 9, "old")
+        if ends in raised:
+            raise raised[ends]
+        return "old"
+
+    latest.ask("a", old)
+    assert begun.wait(HANG_S)
+    first = latest._thread
+    latest.cancel()
+    latest.ask("a", lambda progress: progress(2, 3, "new") or "new")
+    seen = [latest.wait(HANG_S)]
+    go.set()
+    first.join(HANG_S)
+    seen.append(latest.state)
+    assert [(s.key, s.running, s.done, s.total, s.what, s.result, s.error) for s in seen] == [
+        ("a", False, 2, 3, "new", "new", "")
+    ] * 2
+    assert latest._thread is not first and not first.is_alive()
