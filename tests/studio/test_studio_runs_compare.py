@@ -1142,3 +1142,58 @@ def test_a_campaign_file_that_becomes_another_is_read_anew(session, text, time_s
         os.utime(path, (seconds, seconds))
         assert runs_view._names_a_mission(path) is names
     assert runs_view.campaign_files(session) == ()
+
+
+def test_manifests_of_other_programs_are_passed_over_whatever_they_hold(session, draft):
+    """Each alone would be of this text; the one that can be read is found behind all of them."""
+    good = json.loads(finished(session, draft, "study").read_text("utf-8"))
+    mission, summary = good["mission"], good["summary"]
+    (row,) = summary["requirements"]
+    odd = [
+        *([], 3, None, "text", {}, {"mission": None}, {"mission": [mission]}, {"mission": mission}),
+        *({"mission": mission, "summary": each} for each in (None, [summary], {"requirements": [row]})),
+        *(
+            {"mission": mission, "summary": summary | {"requirements": each}}
+            for each in (
+                None,
+                7,
+                [None],
+                [row | {"actual": "x"}],
+                [row | {"required": []}],
+                [{**row, "unit": "dB2"}, 1],
+            )
+        ),
+    ]
+    written = [json.dumps(each).encode() for each in odd] + [b"", b"\xff", b"{", b"\x00"]
+    for number, content in enumerate(written):
+        (session.folder / f"odd-{number}").mkdir()
+        (session.folder / f"odd-{number}" / "manifest.json").write_bytes(content)
+    (session.folder / "folder" / "manifest.json").mkdir(parents=True)
+    (session.folder / "loop").mkdir()
+    (session.folder / "loop" / "manifest.json").symlink_to("manifest.json")
+    found = compare_view.finished_study(session, draft)
+    assert (found.folder, found.verdict, found.met) == ("study", "it closes", True)
+
+
+def test_of_too_many_folders_the_first_by_their_names_are_looked_into(session, draft, monkeypatch):
+    monkeypatch.setattr(compare_view, "_MOST_FOLDERS", 2)
+    paths = {name: finished(session, draft, name, verdict=f"of {name}") for name in ("c", "a", "d", "b")}
+    for name, seconds in zip("dcab", (4e9, 3e9, 1e9, 2e9), strict=True):
+        os.utime(paths[name], (seconds, seconds))
+    asked = []
+    folder = SimpleNamespace(glob=lambda pattern: asked.append(pattern) or paths.values())
+    found = compare_view.finished_study(SimpleNamespace(folder=folder), draft)
+    assert (found.folder, found.verdict, asked) == ("b", "of b", ["*/manifest.json"])
+
+
+@pytest.mark.parametrize("error", [OSError(40, "Too many levels of symbolic links"), RuntimeError("Symlink loop")])
+def test_a_result_whose_place_cannot_be_told_is_not_offered(session, monkeypatch, error):
+    (session.folder / "x.ledger").touch()
+    job = campaign(session.folder, 1)
+    assert runs_view.ledger_path(session, job) == session.folder / "x.ledger"
+
+    def refuse(path, strict=False):
+        raise error
+
+    monkeypatch.setattr(Path, "resolve", refuse)
+    assert (runs_view.ledger_path(session, job), runs_view.result_files(session, job)) == (None, ())
