@@ -1645,3 +1645,19 @@ def test_a_controller_that_is_not_tuned_yet_has_a_row_that_says_why_beside_those
     ]
     untold = next(each for each in control_model.blocks({"PI": "being tuned"}) if isinstance(each, Table))
     assert (list(untold.headings), untold.rows) == (["controller", "tuned to"], [["PI", "being tuned"]])
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        *("", "{", "[]", "7", "null", '"text"', "[" * 100_000, "{}"),
+        '{"warnings": [], "refused": [], "model": "m", "verdict": []}',
+        '{"warnings": [], "refused": null, "model": "m", "verdict": []}',
+        '{"warnings": 3, "refused": {}, "model": "m", "verdict": []}',
+        '{"warnings": [], "refused": {}, "model": "m"}',
+        '{"warnings": [], "refused": {}, "verdict": []}',
+        '{"warnings": [], "refused": {}, "model": "m", "verdict": null}',
+    ],
+)
+def test_what_is_no_outcome_of_an_identification_is_none(said):
+    assert mirror_view.outcome(said) is None

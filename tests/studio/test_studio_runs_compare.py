@@ -1197,3 +1197,17 @@ def test_a_result_whose_place_cannot_be_told_is_not_offered(session, monkeypatch
 
     monkeypatch.setattr(Path, "resolve", refuse)
     assert (runs_view.ledger_path(session, job), runs_view.result_files(session, job)) == (None, ())
+
+
+def test_a_campaign_file_that_is_taken_away_as_it_is_read_names_no_mission(session, monkeypatch):
+    for name in ("a.toml", "b.toml"):
+        (session.folder / name).write_text('mission = "mission.toml"\n', "utf-8")
+    read = runs_view.read_bytes
+
+    def gone(path, most):
+        if path.name == "a.toml":
+            raise FileNotFoundError(2, "No such file or directory")
+        return read(path, most)
+
+    monkeypatch.setattr(runs_view, "read_bytes", gone)
+    assert runs_view.campaign_files(session) == ("b.toml",)

@@ -1094,3 +1094,16 @@ def test_a_result_in_an_inner_folder_is_saved_by_its_own_name(file):
         (str(file.parent / name), f'{way}; filename="{Path(name).name}"')
         for name, way in zip(results, ways, strict=True)
     ]
+
+
+def test_a_file_that_cannot_be_looked_at_has_no_sign_and_any_other_one_its_own(file):
+    from microrad.studio.session import _sign
+
+    assert [_sign(path) for path in (Path("a\0b.csv"), file / "x", file.with_name("none"))] == [None] * 3
+    one, other = file.with_name("one.csv"), file.with_name("other.csv")
+    for path in (one, other):
+        path.write_text("1\n", "utf-8")
+        os.utime(path, (1e9, 1e9))
+    assert _sign(one) == _sign(one) != _sign(other)
+    os.link(one, file.with_name("again.csv"))
+    assert _sign(file.with_name("again.csv")) == _sign(one)
