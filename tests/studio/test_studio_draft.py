@@ -1018,3 +1018,18 @@ def test_a_text_with_a_sign_of_comments_in_it_is_changed_like_any_other(tmp_path
     draft = Draft('name = "x # y" # why # not\n', tmp_path / "m.toml", ())
     written = typed if typed.startswith("'") else f'"{typed}"'
     assert draft.set("name", typed).text == f"name = {written} # why # not\n"
+
+
+@pytest.mark.parametrize(
+    "error", [FileNotFoundError(2, "No such file or directory"), PermissionError(13, "Permission denied")]
+)
+def test_a_file_that_is_there_again_once_it_is_looked_at_again_is_to_be_opened_again(draft, monkeypatch, error):
+    def gone(path, most):
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(drafts, "read_bytes", gone)
+        with pytest.raises(DraftError) as refusal:
+            Draft.open(draft.path)
+    assert str(refusal.value) == f"{draft.path} changed while it was read; open it again"
+    assert Draft.open(draft.path) == draft
