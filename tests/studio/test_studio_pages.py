@@ -3114,3 +3114,12 @@ def test_figures_that_were_hidden_stay_hidden_while_their_campaign_goes_on(sessi
     assert card._panel is panel and texts(card.place).count("No row is in the ledger yet.") == 1
     card._toggle()
     assert (panel.open, card.figures.text) == (True, "Hide its figures")
+
+
+def test_a_panel_tells_the_fault_of_a_ledger_of_which_no_row_could_be_read(session, tab):
+    path = session.folder / "x.ledger"
+    path.write_bytes(b"no ledger at all" * 100)
+    panel = runs_jobs.CampaignPanel(session, path)
+    asyncio.run(panel._look())
+    assert "is no ledger" in panel._fault.text
+    assert (panel._fault.visible, panel._rows.visible) == (True, False)

@@ -271,12 +271,13 @@ class CampaignPanel:
             return
         self._last = live
         found = await in_thread(self.place, figures, live)
-        self._fault.text = live.fault
-        self._fault.visible = bool(live.fault)
         if found is None:
             self._clear()
         else:
             self._show(found)
+        self._fault.text = live.fault
+        self._fault.visible = bool(live.fault)
+        self._rows.visible = found is not None or not live.fault
 
     def _clear(self) -> None:
         """Say that there are no rows yet."""
