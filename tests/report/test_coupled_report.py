@@ -1279,3 +1279,12 @@ def test_a_short_table_has_the_best_model_of_each_kind_and_the_chosen_one():
         ("per axis, order 2", "11", "52.3 %", ""),
     ]
     assert [*table.best] == [1]
+
+
+@pytest.mark.parametrize("without", [0, 2, 3])
+def test_one_sensor_of_four_without_a_place_leaves_geometry_and_signs_open(found, without):
+    outputs = tuple(Output(f"y{k}", "displacement", None if k == without else (0.01, k / 100)) for k in range(4))
+    model = SimpleNamespace(outputs=outputs, excited_hz=(1.0, 2.0), known=object())
+    said = words.not_held(replace(found, candidates=(replace(found.candidate(), model=model),)))
+    for begins in ("A geometry: where the displacements are measured was not stated", "Which way round the channels"):
+        assert sum(text.startswith(begins) for text in said) == 1

@@ -1891,3 +1891,24 @@ def test_recordings_are_drawn_in_volts_and_radians_with_what_each_served_for():
     assert [each.drive_v.tolist() for each in made] == [[0.0, 10.0 * k, -10.0 * k, 30.0 * k] for k in (1, 2, 4, 8)]
     np.testing.assert_allclose(made[1].output_rad, 14e-6 * np.array([0.0, 1.0, -1.0, 3.0]))
     assert made[2].time_s.tolist() == [0.0, 0.125, 0.25, 0.375]
+
+
+@pytest.mark.parametrize(
+    ("fitted", "period", "drawn_with"),
+    [("b", 160, (160, None)), ("b", 150, (150, 150)), ("ab", 160, (160, 160))],
+)
+def test_the_one_fitted_recording_of_less_than_two_periods_is_drawn_as_one_without_a_period(
+    monkeypatch, fitted, period, drawn_with
+):
+    values = philox(3).standard_normal(300)
+    given = [replace(recording_from_arrays(values, values, 50.0, f"{name}.csv", period), sha256=name) for name in "ab"]
+    drawn = []
+
+    def panels(places, recording, found, linear, seen):
+        drawn.append(recording.period_samples)
+        return 90.0
+
+    monkeypatch.setattr(figures, "roles", lambda these: Roles([r for r in given if r.sha256 in fitted], given, given))
+    monkeypatch.setattr(figures, "_response_panels", panels)
+    figures.time_response(ns(linear=ns(order=7), sources=[], recordings=()), given)
+    assert tuple(drawn) == drawn_with

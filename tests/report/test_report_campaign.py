@@ -3046,3 +3046,86 @@ def test_two_findings_and_two_warnings_stand_in_text_page_and_data_each_in_its_p
     places = [page.index(each) for each in words]
     assert places == sorted(places) and [page.count(each) for each in words] == [1] * 4
     assert (data["findings"], data["warnings"]) == ([*words[:2]], [*words[2:]])
+
+
+def test_each_of_four_radii_of_a_tail_is_marked_in_a_look_of_its_own():
+    radii = {0.1: 1.5e-6, 0.01: 2e-6, 1e-3: 2.5e-6, 1e-4: 2.75e-6}
+    wanted = {p: Interval(at, at, at, CONFIDENCE) for p, at in radii.items()}
+    found = [mark for mark in tail_of(wanted=wanted) if getattr(mark, "marker", "")]
+    assert [(mark.x[0], mark.y[0]) for mark in found] == [pytest.approx((1e6 * at, p)) for p, at in radii.items()]
+    assert [mark.label for mark in found] == [
+        "10 %: 1.50 µrad",
+        "1 %: 2.00 µrad",
+        "0.1 %: 2.50 µrad",
+        "10⁻⁴: 2.75 µrad",
+    ]
+    assert [mark.marker for mark in found] == ["o", "s", "D", "o"]
+    assert len({mark.colour for mark in found[:3]}) == 3
+
+
+def test_errors_beyond_two_radii_are_told_by_size_each_with_its_own_variance_or_none():
+    """The second comes from importance sampling: 0.01 · 0.99 / 4.95e-6 draws."""
+    beyond = {3e-6: between_ends(0.004), 2.5e-6: between_ends(0.01), 2e-6: between_ends(0.25)}
+    tail = short_tail(beyond=beyond, variance={2e-6: 0.0125, 2.5e-6: 4.95e-6})
+    _, *said = campaign_words.tail_sentences(a_campaign([], limits=()), a_cell(tail=tail))
+    worth = "The variance of that estimate is {}, that of {} draws without importance sampling."
+    assert said == [
+        "The radial error is beyond 2 µrad with probability 25 % (12.5 % to 31.2 % at 90 % confidence). "
+        + worth.format("0.013", 15),
+        "The radial error is beyond 2.5 µrad with probability 1 % (0.5 % to 1.25 % at 90 % confidence). "
+        + worth.format("5e-06", 2000),
+        "The radial error is beyond 3 µrad with probability 0.4 % (0.2 % to 0.5 % at 90 % confidence).",
+    ]
+    (cell,) = campaign_data(a_campaign([a_cell(tail=tail)]))["cells"]
+    assert [(each["error_rad"], each["value"], each["variance"]) for each in cell["tail"]["beyond"]] == [
+        (3e-6, 0.004, None),
+        (2.5e-6, 0.01, 4.95e-6),
+        (2e-6, 0.25, 0.0125),
+    ]
+
+
+@pytest.mark.parametrize("count", [40, 41])
+def test_a_terminal_lists_the_first_forty_combinations(count):
+    cell = summary_of(0, rows=4, loop=False).cells[0]
+    cells = tuple(replace(cell, values={"a.b": f"v{k}"}) for k in range(count))
+    for limits, tables in (((), 1), (LIMITS[:1], 2)):
+        summary = replace(summary_of(0, rows=4, loop=False), cells=cells, limits=limits)
+        found = campaign_terminal._over_the_grid(summary, 30)
+        assert len(found) == tables
+        for table in found:
+            assert [row[0] for row in table.rows] == [f"v{k}" for k in range(40)]
+
+
+def test_an_input_that_ranks_first_alone_is_followed_by_another_input_and_not_by_itself():
+    index = {"jitter.rms": between_ends(0.5), "mirror.alpha": NO_INTERVAL}
+    each = Sensitivity("margin", 30, index, {}, {}, 0.9, "")
+    summary = a_campaign([a_cell()], sensitivities=(each,))
+    assert campaign_module._leading(summary, "margin", slice(None)) == ["jitter.rms", "mirror.alpha"]
+
+
+def test_the_rows_of_indices_tell_an_input_from_those_that_have_no_room_too():
+    """The fifteenth input, whose index is the least, ends as the first does."""
+    first = {f"input.of_{k}": between_ends(0.9 - 0.01 * k) for k in range(13)}
+    first = {"a.gain.rate": between_ends(0.95), **first, "b.gain.rate": between_ends(0.1)}
+    each = Sensitivity("margin", 30, first, {}, {}, 0.9, "")
+    (figure,) = drawing.sensitivity(a_campaign([a_cell()], sensitivities=(each,)))
+    labels = [*figure.sheet.panels[0].y.ticks.values()]
+    assert (len(labels), labels[0], labels[1], labels[-1]) == (14, "a.gain.rate", "input.of_0", "input.of_12")
+    assert figure.caption.endswith(" 1 input with smaller indices is in the table only.")
+
+
+def test_outputs_beyond_three_have_their_indices_in_a_further_figure_in_the_order_of_all():
+    first = {"a.b": 0.2, "c.d": 0.3}
+    found = [
+        Sensitivity(name, 30, {key: between_ends(index) for key, index in first.items()}, {}, {}, 0.9, "")
+        for name in ("one", "two", "three")
+    ]
+    found.append(replace(found[0], output="four", rows=20, first={"a.b": between_ends(0.8), "c.d": between_ends(0.1)}))
+    figures = drawing.sensitivity(a_campaign([a_cell()], sensitivities=tuple(found)))
+    assert [(figure.name, figure.title) for figure in figures] == [
+        ("campaign-sensitivity-1", "What matters to one, two, three"),
+        ("campaign-sensitivity-2", "What matters to four"),
+    ]
+    for figure, rows in zip(figures, (30, 20), strict=True):
+        assert [*figure.sheet.panels[0].y.ticks.values()] == ["a.b", "c.d"]
+        assert f" from {rows} rows: " in figure.caption
