@@ -1288,3 +1288,49 @@ def test_one_sensor_of_four_without_a_place_leaves_geometry_and_signs_open(found
     said = words.not_held(replace(found, candidates=(replace(found.candidate(), model=model),)))
     for begins in ("A geometry: where the displacements are measured was not stated", "Which way round the channels"):
         assert sum(text.startswith(begins) for text in said) == 1
+
+
+def test_an_amplitude_of_which_nothing_is_held_out_between_two_others_leaves_each_its_own_numbers():
+    rms = 1e-6 * np.array([[1.0, 2.0], [np.nan, np.nan], [4.0, 8.0]])
+    error = rms * np.array([[0.1], [np.nan], [0.2]])
+    own = replace(found_of().candidate(), error_rms=error, band_error_rms=error[:, None, :] * [[[0.6], [0.8]]])
+    none = {"noise_rms": 0.01 * rms, "responses": (None,) * 3, "modelled": (None,) * 3}
+    drives = {"amplitudes_v": np.array([0.1, 0.2, 0.3]), "output_rms": rms}
+    found = found_of(candidates=(own,), within_noise=(own.name,), **drives, **none)
+    table = coupled_page._candidates(found)
+    assert [*table.headings[3:5]] == ["at 100 mV rms", "at 300 mV rms"]
+    assert [row[3:5] for row in table.rows] == [("10 %", "20 %")]
+    assert words.by_amplitude(found) == (
+        "It leaves 158 nm rms (10 % of the output) at 100 mV rms drive and 1.26 µm rms (20 % of the output) at 300 mV "
+        "rms drive."
+    )
+    assert [row[3] for row in coupled_page._amplitudes(found).rows] == ["10 %", "", "20 %"]
+    names = [output.name for output in own.model.outputs]
+    assert [(row[0], *row[2:]) for row in coupled_page._bands(found).rows] == [
+        (f"100 mV, {names[0]}", "0.06", "0.08"),
+        (f"100 mV, {names[1]}", "0.12", "0.16"),
+        (f"300 mV, {names[0]}", "0.48", "0.64"),
+        (f"300 mV, {names[1]}", "0.96", "1.28"),
+    ]
+    panels = bands(found).sheet.panels
+    assert [(panel.row, panel.column, panel.title) for panel in panels] == [
+        (row, column, f"{name}, {drive}")
+        for row, drive in enumerate(("100 mV", "300 mV"))
+        for column, name in enumerate(names)
+    ]
+    curves = [panel.all_of(Line)[0].y for panel in panels]
+    np.testing.assert_allclose(
+        curves, [[low, low, high, high] for low, high in ((0.06, 0.08), (0.12, 0.16), (0.48, 0.64), (0.96, 1.28))]
+    )
+
+
+def test_points_of_a_kind_are_joined_by_their_parameters_whatever_their_order_and_error():
+    more = (
+        unlike_candidate("coupled linear, order 5", "coupled linear", 31, 0.1937),
+        unlike_candidate("coupled linear, order 4", "coupled linear", 23, 0.25),
+    )
+    found = unlike_found()
+    (panel,) = error_over_parameters(replace(found, candidates=(*more, *found.candidates))).sheet.panels
+    (line,) = [line for line in panel.all_of(Line) if line.label == "coupled linear"]
+    assert line.x.tolist() == [17.0, 23.0, 31.0]
+    assert line.y == pytest.approx([21.71, 25.0, 19.37])

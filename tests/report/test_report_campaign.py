@@ -3129,3 +3129,43 @@ def test_outputs_beyond_three_have_their_indices_in_a_further_figure_in_the_orde
     for figure, rows in zip(figures, (30, 20), strict=True):
         assert [*figure.sheet.panels[0].y.ticks.values()] == ["a.b", "c.d"]
         assert f" from {rows} rows: " in figure.caption
+
+
+def test_an_output_has_the_unit_of_the_first_combination_with_results():
+    worse, better = two_cells().cells
+    summary = a_campaign([replace(worse, failed=24, outputs={}, missed=NO_INTERVAL, missed_by={}), better])
+    assert [campaign_tables.unit_of(summary, name) for name in ("margin", "residual_quantile", "none")] == [
+        "dB",
+        "rad",
+        "",
+    ]
+    assert [row[0] for row in campaign_tables.limit_table(summary, better).rows] == [
+        "residual_quantile ≤ 6 µrad",
+        "margin ≥ 0.50 dB and ≤ 12.00 dB",
+    ]
+    assert [limit["unit"] for limit in campaign_data(summary)["limits"]] == ["rad", "dB"]
+    assert [row[2::2] for row in campaign_tables.limited_table(summary, summary.cells).rows] == [
+        ("", ""),
+        ("4.00 µrad", "4.00 dB"),
+    ]
+    (figure,) = drawing.grid(summary)
+    assert [panel.title for panel in figure.sheet.panels] == [
+        "rows that miss a limit (%)",
+        "median residual_quantile (µrad)",
+    ]
+
+
+def test_the_tails_of_all_other_combinations_stand_in_grey_behind_that_of_the_one_shown():
+    tails = [short_tail(survival=np.array([p, p / 10.0, p / 100.0, 0.0])) for p in (0.5, 0.6, 0.7, 0.8)]
+    cells = [a_cell({"mirror": f"{k}.toml"}, tail=tail) for k, tail in enumerate(tails)]
+    cells.insert(1, a_cell({"mirror": "none.toml"}))
+    (figure,) = drawing.tail(a_campaign(cells), cells[3])
+    curves = [(line.label, line.y.tolist()) for line in figure.sheet.panels[0].all_of(Line) if line.dash == "-"]
+    assert curves == [
+        ("other combinations", pytest.approx([0.5, 0.05, 0.005])),
+        ("other combinations", pytest.approx([0.6, 0.06, 0.006])),
+        ("other combinations", pytest.approx([0.8, 0.08, 0.008])),
+        ("mirror = 2.toml", pytest.approx([0.7, 0.07, 0.007])),
+    ]
+    assert figure.columns["probability"].tolist() == pytest.approx([0.7, 0.07, 0.007, 0.0])
+    assert figure.caption.startswith("Probability that the radial error of mirror = 2.toml exceeds a radius.")

@@ -1670,3 +1670,29 @@ def test_what_is_run_again_is_compared_with_the_names_that_the_mission_gives_in_
     assert (again.folder.name, again.steps) == ("again", "steps of a study")
     assert told == [(was, "study"), (1, 2, "ran mission"), (2, 2, "written of a study")]
     assert not again.folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("names", "own"),
+    [
+        (["a", "a/b.csv"], ["a", "named-file-1.csv"]),
+        (["a/b.csv", "a"], ["a/b.csv", "named-file-1"]),
+        (["a/b.csv", "a/b.csv/c/d.txt", "a/c.csv"], ["a/b.csv", "named-file-1.txt", "a/c.csv"]),
+    ],
+)
+def test_a_named_file_is_no_folder_of_another(tmp_path, names, own):
+    at = manifest_reader.ReadManifest(tmp_path / "m.json", held(inputs={name: f"of {name}" for name in names}), "")
+    assert [manifest_reader._place(tmp_path, number, name, at) for number, name in enumerate(names)] == own
+    files = {p.relative_to(tmp_path).as_posix(): p.read_text("utf-8") for p in tmp_path.rglob("*") if p.is_file()}
+    assert files == {place: f"of {name}" for place, name in zip(own, names, strict=True)}
+
+
+@pytest.mark.parametrize("mirror", ['"a file"', "7", '["file"]'])
+def test_a_mission_whose_mirror_is_no_table_is_refused_by_its_fault(tmp_path, mirror):
+    file = missionfile.load_mission(SHIPPED)
+    text = file.text
+    begin, end = text.index("[mirror]\n"), text.index("[amplifier]\n")
+    text = f"mirror = {mirror}\n{text[:begin]}{text[end:]}"
+    held = manifest_reader.ReadManifest(tmp_path / "report.html", {"mission": report_entry(file, text=text)}, "")
+    with pytest.raises(missionfile.MissionError, match="mirror"):
+        manifest_reader.unpack_mission(held, tmp_path / "inside")
