@@ -1334,3 +1334,12 @@ def test_points_of_a_kind_are_joined_by_their_parameters_whatever_their_order_an
     (line,) = [line for line in panel.all_of(Line) if line.label == "coupled linear"]
     assert line.x.tolist() == [17.0, 23.0, 31.0]
     assert line.y == pytest.approx([21.71, 25.0, 19.37])
+
+
+@pytest.mark.parametrize(
+    ("known", "drawn"),
+    [([], None), ([1], 1), ([0, 2], 2), ([0, 2, 3], 2), ([1, 2, 5], 2), ([0, 1, 3, 4], 3)],
+)
+def test_the_response_that_is_drawn_is_the_middle_one_of_those_that_there_are(known, drawn):
+    responses = [SimpleNamespace() if k in known else None for k in range(6)]
+    assert words.drawn_amplitude(SimpleNamespace(responses=responses)) == drawn

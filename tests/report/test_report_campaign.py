@@ -3097,10 +3097,10 @@ def test_a_terminal_lists_the_first_forty_combinations(count):
 
 
 def test_an_input_that_ranks_first_alone_is_followed_by_another_input_and_not_by_itself():
-    index = {"jitter.rms": between_ends(0.5), "mirror.alpha": NO_INTERVAL}
+    index = {"mirror.alpha": between_ends(0.5), "jitter.rms": NO_INTERVAL}
     each = Sensitivity("margin", 30, index, {}, {}, 0.9, "")
     summary = a_campaign([a_cell()], sensitivities=(each,))
-    assert campaign_module._leading(summary, "margin", slice(None)) == ["jitter.rms", "mirror.alpha"]
+    assert campaign_module._leading(summary, "margin", slice(None)) == ["mirror.alpha", "jitter.rms"]
 
 
 def test_the_rows_of_indices_tell_an_input_from_those_that_have_no_room_too():

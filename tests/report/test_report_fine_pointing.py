@@ -35,6 +35,7 @@ from microrad.report.fine_pointing import recording as recorded
 from microrad.report.fine_pointing.figures import fine_pointing_figures
 from microrad.report.plotting.sheet import Line, Panel, Rule
 from microrad.report.requirements import requirement_table
+from microrad.report.results import arrays
 from microrad.report.results.arrays import study_netcdf
 from microrad.report.results.manifest import manifest_of
 from microrad.report.study import chain
@@ -2534,3 +2535,129 @@ def test_the_setting_of_a_loop_of_several_axes_has_its_counts_times_and_the_dist
         "loop: body 2.00 µrad and wheels 1.25 µrad. Simulated: 7 runs of 20 s each, the first 500 ms left out, seed "
         "11. A design has to keep a modulus margin of 0.55."
     )
+
+
+def design_of(k):
+    """A controller whose margins are seven numbers of its own."""
+    names = ("modulus", "gain_up", "phase_rad", "delay_s", "disk", "bandwidth_hz", "crossover_hz")
+    return SimpleNamespace(
+        name=f"controller {k}", loop_margins=SimpleNamespace(**{name: 10.0**n + k for n, name in enumerate(names)})
+    )
+
+
+def residual_of(n, **shares):
+    axis = np.array([n + 0.25, n + 0.75])
+    met = {"saturated samples": 0.125 * n} | shares
+    return SimpleNamespace(
+        rms_rad=1.0 * n,
+        rms_interval_rad=0.1 * n,
+        quantile_rad=2.0 * n,
+        largest_rad=3.0 * n,
+        axis_rms_rad=axis,
+        shares=met,
+    )
+
+
+def test_arrays_of_three_controllers_of_unlike_sources_and_mirrors_have_each_number_in_its_own_place():
+    """The second and the third controller ran on a mirror that the first did not, and know another source of error."""
+    simulated = [
+        {"given": residual_of(1)},
+        {"stiff": residual_of(2), "given": residual_of(3)},
+        {"stiff": residual_of(4)},
+    ]
+    known = [
+        {"wind": [1.0, 8.0], "noise": [0.0, 4.0]},
+        {"gauge": [9.0, 16.0], "noise": [2.0, 2.0]},
+        {"gauge": [0.0, 1.0]},
+    ]
+    freq, spectrum = np.array([1.0, 10.0, 100.0, 1000.0]), np.arange(8.0).reshape(4, 2)
+    verified = [
+        SimpleNamespace(
+            design=design_of(k),
+            simulated=simulated[k],
+            theory=SimpleNamespace(error_by_source=known[k], radial_rms_rad=0.5 + k),
+            spectrum_rad2_hz=spectrum + 100.0 * k,
+            predicted_rad2_hz=spectrum + 100.0 * k + 0.5,
+        )
+        for k in range(3)
+    ]
+    fine = SimpleNamespace(
+        verified=verified,
+        scene=SimpleNamespace(loop=SimpleNamespace(axes=2)),
+        quantile=0.95,
+        best=verified[1],
+        optimum_rad=0.375,
+        freq_hz=freq,
+        disturbed_rad2_hz=freq + 7.0,
+    )
+    spectra, residuals, theory, loop_margins = (
+        make(fine) for make in (arrays._spectra, arrays._residuals, arrays._theory, arrays._loop_margins)
+    )
+    names = ["controller 0", "controller 1", "controller 2"]
+    for group in (spectra, residuals, theory, loop_margins):
+        assert group.coordinates["controller"].values.tolist() == names
+    for key, more in (("residual", 0.0), ("predicted", 0.5)):
+        assert spectra.variables[key].dims == ("controller", "frequency", "axis")
+        assert_array_equal(spectra.variables[key].values, [spectrum + 100.0 * k + more for k in range(3)])
+    assert_array_equal(spectra.variables["before"].values, freq + 7.0)
+    assert_array_equal(spectra.coordinates["frequency"].values, freq)
+    assert residuals.attributes == {"quantile": 0.95, "best": "controller 1"}
+    assert residuals.coordinates["mirror"].values.tolist() == ["given", "stiff"]
+    n = np.array([[1.0, np.nan], [3.0, 2.0], [np.nan, 4.0]])
+    of = residuals.variables
+    for key, factor in (("rms", 1.0), ("rms_interval", 0.1), ("quantile", 2.0), ("largest", 3.0)):
+        assert_allclose(of[key].values, factor * n)
+    assert_array_equal(of["axis_rms"].values, n[:, :, None] + [0.25, 0.75])
+    assert_array_equal(of["share"].values[:, :, 0], 0.125 * n)
+    assert_array_equal(of["share"].values[:, :, 1:], np.where(np.isnan(n), np.nan, 0.0)[:, :, None] * np.ones(5))
+    assert theory.coordinates["source"].values.tolist() == ["wind", "noise", "gauge"]
+    none = np.nan
+    assert_array_equal(
+        theory.variables["rms_by_source"].values, [[3.0, 2.0, none], [none, 2.0, 5.0], [none, none, 1.0]]
+    )
+    assert (theory.variables["rms"].values.tolist(), float(theory.variables["bound"].values)) == (
+        [0.5, 1.5, 2.5],
+        0.375,
+    )
+    for power, key in enumerate(
+        ("modulus", "gain_up_db", "phase_rad", "delay_s", "disk", "bandwidth_hz", "crossover_hz")
+    ):
+        values = 10.0**power + np.arange(3.0)
+        assert_allclose(loop_margins.variables[key].values, 20.0 * np.log10(values) if power == 1 else values)
+
+
+def test_arrays_of_the_loops_budget_and_sines_have_unlike_numbers_of_each_kind():
+    parts = [
+        SimpleNamespace(name=f"part {k}", rms_rad=1.0 + k, theory_rad=None if k == 1 else 5.0 + k) for k in range(3)
+    ]
+    left_out = [SimpleNamespace(name=f"without {k}", with_rad=20.0 + k, without_rad=10.0 + k) for k in range(2)]
+    budget = SimpleNamespace(
+        parts=parts, differences=left_out, combined_rad=0.25, together_rad=0.5, full_rad=0.75, controller="PI"
+    )
+    sines = [
+        SimpleNamespace(controller=f"c{k}", variant=f"m{k}", freq_hz=10.0 * k, rms_rad=1.0 + k, quantile_rad=2.0 + k)
+        for k in range(4)
+    ]
+    fine = SimpleNamespace(budget=budget, sines=sines, quantile=0.95)
+    found, of = arrays._error_budget(fine), arrays._sines(fine)
+    assert found.attributes == {"controller": "PI"}
+    assert found.coordinates["part"].values.tolist() == ["part 0", "part 1", "part 2"]
+    assert found.coordinates["left_out"].values.tolist() == ["without 0", "without 1"]
+    values = {name: variable.values for name, variable in found.variables.items()}
+    assert_array_equal(values.pop("theory"), [5.0, np.nan, 7.0])
+    assert {name: each.tolist() for name, each in values.items()} == {
+        "rms": [1.0, 2.0, 3.0],
+        "combined": 0.25,
+        "together": 0.5,
+        "full": 0.75,
+        "with": [20.0, 21.0],
+        "without": [10.0, 11.0],
+    }
+    assert {name: variable.values.tolist() for name, variable in of.variables.items()} == {
+        "controller": ["c0", "c1", "c2", "c3"],
+        "mirror": ["m0", "m1", "m2", "m3"],
+        "frequency": [0.0, 10.0, 20.0, 30.0],
+        "rms": [1.0, 2.0, 3.0, 4.0],
+        "quantile": [2.0, 3.0, 4.0, 5.0],
+    }
+    assert of.variables["quantile"].long_name == "radial error that 0.95 of the time stays below"
