@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import cont2discrete, lfilter, welch
 
 from drawn import figure_of, lines_of, one_text, outline
 from drawn import plain as rounded_numbers
@@ -1912,3 +1912,31 @@ def test_the_one_fitted_recording_of_less_than_two_periods_is_drawn_as_one_witho
     monkeypatch.setattr(figures, "_response_panels", panels)
     figures.time_response(ns(linear=ns(order=7), sources=[], recordings=()), given)
     assert tuple(drawn) == drawn_with
+
+
+def test_one_start_of_three_may_reach_the_best_fit():
+    fit = made(BoucWenFit, agreeing_starts=1, start_rms_percent=(1.0, 2.0, 3.0))
+    assert starts_text(fit) == "1 of 3 starts reached the best fit"
+    alone = made(BoucWenFit, agreeing_starts=1, start_rms_percent=(1.0,))
+    assert starts_text(alone) == "one start was made, from the least-squares weights of the operators"
+
+
+@pytest.mark.parametrize("samples", [2047, 2048, 3071, 3072, 9000])
+def test_the_spectrum_of_a_residual_is_the_mean_over_half_overlapping_segments(samples):
+    values = 3.0 + philox(samples).standard_normal(samples).cumsum()
+    freq, density = figures._spectrum(values, 500.0)
+    known, expected = welch(values, 500.0, nperseg=min(samples, 2048))
+    np.testing.assert_allclose(freq, known)
+    np.testing.assert_allclose(density, expected, rtol=1e-6, atol=1e-9 * expected.max())  # sums in another order
+
+
+def test_why_an_order_was_chosen_begins_with_a_capital_and_keeps_its_names(monkeypatch):
+    for made_of in ("_scan", "_roots"):
+        monkeypatch.setattr(identification_page, made_of, lambda linear: None)
+    view = identification_page._linear(ns(linear=ns(reason="order 4 has the lowest BIC of Hankel matrices")), {})
+    assert outline(view) == one_text("""
+# Linear part
+# Order
+Order 4 has the lowest BIC of Hankel matrices.
+# Poles, zeros and gains
+""")

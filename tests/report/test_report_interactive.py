@@ -2222,3 +2222,44 @@ def test_a_figure_has_the_forms_that_it_is_given_and_draws_its_own_where_it_is_c
     assert (still.svg, still.plot, still.alive, figure.alive) == (drawn[0], "", False, True)
     assert "earlier" not in drawn[0] and json.loads(drawn[1])["data"][0]["name"] == "a curve"
     assert figure.rows(3) == [("1.25", "one"), ("2.5", "two")]
+
+
+@pytest.mark.parametrize("ticks", [{0.0: "one", 2.0: "two\nlines"}, {0.0: "two\nlines", 2.0: "one"}])
+def test_the_title_of_an_axis_stands_below_its_highest_tick_wherever_that_is(ticks):
+    found = parts(one(Line(X, Y), x={"ticks": ticks, "title": "time (s)"}), "text")
+    (title,) = (float(each.get("y")) for each in found if each.text == "time (s)")
+    lowest = max(float(line.get("y")) for each in found for line in each if line.text == "lines")
+    assert title == pytest.approx(lowest + 1.2 * 9.0 + 3.0, abs=0.011)  # a line of its size, and what is free
+
+
+def test_a_legend_above_that_is_wider_than_its_panel_ends_where_the_panel_does():
+    sheet, (panel,) = grid(3.0, 2.5)
+    panel.add(Line(X, Y, label="a label that is about as wide as the sheet is"))
+    panel.legend = Legend("above")
+    (key,), (placed,) = layout(sheet).keys, layout(sheet).placed
+    assert key.width > placed.inner[2] - placed.inner[0]
+    assert key.x + key.width == pytest.approx(placed.outer[2])
+    panel.marks[:] = [Line(X, Y, label="short")]
+    (key,), (placed,) = layout(sheet).keys, layout(sheet).placed
+    assert key.x + key.width / 2.0 == pytest.approx((placed.inner[0] + placed.inner[2]) / 2.0)
+
+
+def test_panels_that_share_an_axis_without_a_title_have_that_of_the_lowest_and_of_the_first():
+    sheet, (high, _, low) = grid(4.0, 4.0, 3, 1, share_x=True)
+    high.x.title, low.x.title = "first (s)", "last (s)"
+    assert [placed.x_title for placed in layout(sheet).placed] == ["first (s)", "last (s)", "last (s)"]
+    sheet, (left, _, right) = grid(6.0, 2.0, 1, 3, share_y=True)
+    left.y.title, right.y.title = "first (m)", "last (m)"
+    assert [placed.y_title for placed in layout(sheet).placed] == ["first (m)", "first (m)", "last (m)"]
+    sheet.share_y = False
+    assert [placed.y_title for placed in layout(sheet).placed] == ["first (m)", "", "last (m)"]
+
+
+@pytest.mark.parametrize(("columns", "title"), [(1, "kind"), (2, "A title kind")])
+def test_the_legend_of_a_panel_has_the_panels_title_where_there_are_others(columns, title):
+    sheet, panels = grid(6.0, 3.0, 1, columns)
+    for panel in panels:
+        panel.add(Line(X, Y, label="a"))
+    panels[0].title, panels[0].legend = "A title", Legend("above", title="kind")
+    (key,) = turned(sheet)["keys"]
+    assert key["title"] == title
