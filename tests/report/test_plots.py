@@ -1279,3 +1279,30 @@ def made(kind, **values):
     for name, value in values.items():
         object.__setattr__(found, name, value)
     return found
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "before"), [(2.0, 4.0, (1.0, -1.0)), (2.0, 4.0, (7.0, 6.0)), (4.0, 2.0, (1.0, 9.0))]
+)
+def test_limits_of_a_turned_axis_are_those_of_the_sheet(low, high, before):
+    assert renderer._ends(Axis(low=low, high=high), (0.0, 1.0), before) == (low, high)
+
+
+def test_a_label_that_two_panels_have_stands_in_the_legend_once_as_in_the_first():
+    sheet, panels = grid(5.0, 4.0, 2)
+    sheet.legend = Legend("above")
+    for panel, colour in zip(panels, ("#0072b2", "#d55e00"), strict=True):
+        panel.add(Line(np.arange(3.0), np.arange(3.0), colour, label="both"))
+    (legend,) = axes_of(sheet)[0].figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["both"]
+    assert hue(legend.legend_handles[0].get_color()) == "#0072b2"
+    pyplot.close("all")
+
+
+@pytest.mark.parametrize(("title", "loc"), [("", 8), ("A title", 2)])  # lower center, above the panel, or upper left
+def test_a_legend_wider_than_its_panel_stands_above_it_unless_a_title_does(title, loc):
+    sheet, (panel,) = grid(3.0, 2.5)
+    panel.add(Line(np.arange(3.0), np.arange(3.0), label="a label that is much wider than the whole sheet can ever be"))
+    panel.title, panel.legend = title, Legend("upper left")
+    assert axes_of(sheet).get_legend()._loc == loc
+    pyplot.close("all")
