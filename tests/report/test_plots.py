@@ -1306,3 +1306,15 @@ def test_a_legend_wider_than_its_panel_stands_above_it_unless_a_title_does(title
     panel.title, panel.legend = title, Legend("upper left")
     assert axes_of(sheet).get_legend()._loc == loc
     pyplot.close("all")
+
+
+@pytest.mark.parametrize(
+    ("ticks", "shown"), [((-3.0, 1.0, 8.0), [-3.0, 1.0, 8.0]), ((), [-2.0, 0.0, 2.0, 4.0, 6.0, 8.0])]
+)
+def test_a_colour_bar_has_the_ticks_that_are_set_and_else_round_ones(ticks, shown):
+    sheet, (panel,) = grid(5.0, 4.0)
+    x = np.arange(3.0)
+    panel.add(Field(x, x, np.arange(9.0).reshape(3, 3), -3.0, 8.0, title="margin (dB)", ticks=ticks))
+    _, bar = axes_of(sheet).figure.axes
+    assert bar.get_yticks().tolist() == shown and bar.get_ylabel() == "margin (dB)"
+    pyplot.close("all")
