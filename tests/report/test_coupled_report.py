@@ -660,7 +660,7 @@ def test_a_bias_is_told_to_a_thousandth_of_the_range(bias_v, low_v, high_v, said
     assert str(coupled_page._bias(Actuator("a", bias_v, low_v, high_v, 1.0))) == str(said)
 
 
-@pytest.mark.parametrize(("lines", "more"), [(60, None), (61, "1 more line are"), (62, "2 more lines are")])
+@pytest.mark.parametrize(("lines", "more"), [(60, None), (61, "1 more line is"), (62, "2 more lines are")])
 def test_a_mirror_file_is_shown_to_its_sixtieth_line(found, lines, more):
     text = "\n".join(["x" * 160, "y" * 161, *["z"] * (lines - 2)])
     file = coupled_page._origin(found, Path("m.toml"), text).blocks[1]

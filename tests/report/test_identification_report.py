@@ -800,7 +800,7 @@ def test_a_long_name_of_a_recording_is_cut_in_its_middle():
     assert figures._short("/folder/" + "a" * 36) == "a" * 36
     assert figures._short("/folder/" + "a" * 20 + "b" * 17) == "a" * 20 + "…" + "b" * 15
     none = [None] * figures.MOST_RECORDINGS
-    assert (figures._not_drawn(none), figures._not_drawn([*none, None])) == ("", " 1 more recordings are not drawn.")
+    assert (figures._not_drawn(none), figures._not_drawn([*none, None])) == ("", " 1 more recording is not drawn.")
 
 
 def shown_of(drive, sine=None, role="loops"):

@@ -22,7 +22,7 @@ from microrad.report.identification.page import check_identification
 from microrad.report.identification.terminal import MOST_LINES, warnings_text
 from microrad.report.page.templates import page_of
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import counted, quantity, signed
+from microrad.report.quantities import are, counted, quantity, signed
 from microrad.report.tables import Cell, Table
 from microrad.report.view import Block, Points, Soft, Verbatim, Verdict, View, told, views_text
 
@@ -318,7 +318,7 @@ def _origin(found: CoupledIdentification, mirror_file: Path, mirror_text: str) -
     lines = mirror_text.splitlines()
     more = len(lines) - _MOST_FILE_LINES
     begins = "\n".join(line if len(line) <= 160 else f"{line[:150]} …" for line in lines[:_MOST_FILE_LINES])
-    left = f"{counted(more, 'more line')} are in the file; long ones are cut here." if more > 0 else None
+    left = f"{counted(more, 'more line')} {are(more)} in the file; long ones are cut here." if more > 0 else None
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
     fitted = [(Cell(name, code=True),) for name in found.fitted]
     file = View(f"Mirror file {mirror_file.name}", told(Verbatim(begins), left), folded=True, listed=False)

@@ -24,7 +24,7 @@ from microrad.report.identification import words
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.palette import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION
 from microrad.report.plotting.sheet import Axis, Legend, Line, Panel, Rule, Sheet, Span, between, grid, segments
-from microrad.report.quantities import plain
+from microrad.report.quantities import are, counted, plain
 
 MOST_RECORDINGS = 12  # drawn, a row each
 VIRTUAL = "virtual bench"
@@ -119,7 +119,7 @@ def _short(path: str) -> str:
 
 def _not_drawn(everything: Sequence[Shown]) -> str:
     left = len(everything) - MOST_RECORDINGS
-    return f" {left} more recordings are not drawn." if left > 0 else ""
+    return f" {counted(left, 'more recording')} {are(left)} not drawn." if left > 0 else ""
 
 
 # ------------------------------------------------------------------------------------------------------- excitation
