@@ -6,6 +6,7 @@ import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 
@@ -205,3 +206,19 @@ def test_nothing_is_forked_on_a_single_core_or_one_that_is_not_known(monkeypatch
 def test_nothing_is_forked_on_another_system(monkeypatch, platform):
     monkeypatch.setattr(threads.sys, "platform", platform)
     assert not threads._may_fork()
+
+
+@pytest.mark.parametrize("kind", [SystemExit, ValueError])
+def test_a_process_that_helps_ends_without_a_word_and_leaves_its_job_to_the_caller(kind):
+    said = []
+    turns, given = os.pipe()
+    os.write(given, bytes([0]))
+    os.close(given)
+
+    def job():
+        raise kind
+
+    ear = SimpleNamespace(close=lambda: said.append("ear closed"))
+    threads._help([job], turns, SimpleNamespace(send=said.append), [ear])
+    os.close(turns)
+    assert said == ["ear closed"]

@@ -770,3 +770,13 @@ def test_the_pole_nearest_to_those_of_a_block_is_moved_behind_it(own, others, fe
     at = slice(end, end + len(fetched))
     np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(moved[at, at])), np.sort_complex(fetched), atol=1e-12)
     assert not moved[end + len(fetched) :, at].any()
+
+
+@pytest.mark.parametrize(("pair", "first"), [((1.0, 3.0), [1, 2]), ((3.0, 1.0), [1, 2]), ((1.0, 0.5), [2, 1])])
+def test_a_mode_of_two_states_is_shown_by_both_of_them(pair, first):
+    """A real mode that is shown with 2: before a pair of which one state alone is shown with less, or behind a pair."""
+    T = np.array([[-1.0, 0.0, 0.0], [0.0, -2.0, 5.0], [0.0, -5.0, -2.0]])
+    C = np.array([[2.0, pair[0], 0.0], [0.0, 0.0, pair[1]]])
+    moved, Q = parting._ordered(T, np.eye(3), C, slice(0, 3))
+    assert_allclose(Q @ moved @ Q.T, T, atol=1e-14)
+    assert [parting._lead(moved, 0), parting._lead(moved, parting._lead(moved, 0))] == first

@@ -2444,3 +2444,11 @@ def test_a_channel_by_the_short_name_of_its_array_has_the_rate_of_the_array(tmp_
     assert tuple(each.rate_hz for each in found) == rates
     source = open_source(path)
     assert len({source.resolve(name, "drive") for name in ("cube[0,1]", "run/cube[0, 1]", "cube[ 0 , 1]")}) == 1
+
+
+@pytest.mark.parametrize("name", ["time (h)", "time [h]"])
+def test_a_time_in_an_unknown_unit_of_its_name_is_refused_with_that_unit(tmp_path, name):
+    path = tmp_path / "r.npz"
+    np.savez(path, **{"drive": DRIVE, "output": OUTPUT, name: np.arange(DRIVE.size) / RATE_HZ})
+    with pytest.raises(RecordingError, match=r"the time is in 'h'; convert it to one of s, "):
+        read_recording(path, "drive", "output", time=name)

@@ -76,6 +76,7 @@ from microrad.report.verification.checks import (
     published,
     search,
 )
+from microrad.report.verification.checks import loop as loop_checks
 from microrad.report.verification.evidence import Comparison, Referent
 from microrad.report.view import Drawing, Points, Soft, Verbatim, Verdict, View, anchored, slug, told, views_text
 from microrad.studio.views import link as studio_link
@@ -3849,3 +3850,28 @@ def test_volumes_of_a_day_leave_out_what_is_waited_and_contacts_that_are_shorter
     assert found.shape == (4000, 2) and asked == [100_000]
     assert (found.min(), found.max()) == (1e6 * least, 1e6 * most)
     assert np.all(found[:, 0] <= found[:, 1]) and bool(np.any(found[:, 0] < found[:, 1])) is (least < most)
+
+
+def test_rank_correlations_are_held_within_five_standard_errors_of_all_rows(tmp_path):
+    held = [c for c in draws._shares(workspace.Workspace(tmp_path, None)) if "rank_correlation" in c.quantity]
+    assert len(held) == 2
+    for each in held:
+        assert each.basis == "five standard errors of 16384 rows (Bonett and Wright 2000)"
+        off = 5.0 * (1.0 - each.expected**2) * math.sqrt((1.0 + each.expected**2 / 2.0) / 16384.0)
+        assert each.tolerance == pytest.approx(off, rel=1e-12)
+
+
+def test_the_papers_loop_is_held_over_the_last_of_three_periods(tmp_path, monkeypatch):
+    asked = []
+
+    class AskedError(Exception):
+        pass
+
+    def solve(slope, span, start, method, at_s, **tolerances):
+        asked.append((span, at_s[0], at_s[-1]))
+        raise AskedError
+
+    monkeypatch.setattr(loop_checks.integrate, "solve_ivp", solve)
+    with pytest.raises(AskedError):
+        list(loop_checks._papers_loop(workspace.Workspace(tmp_path, None)))
+    assert asked == [((0.0, 3 / 25.0), 2 / 25.0, pytest.approx(3 / 25.0, rel=1e-12))]

@@ -229,7 +229,8 @@ def test_a_line_is_safe_to_paste(action, line):
 
 @pytest.mark.parametrize("name", ["a'b", 'a"b', "a\\b", "a\nb", "'); raise SystemExit('x"])
 def test_a_name_stays_a_name_in_python(folder, name):
-    for action in (commands.budget(Path(name)), commands.design(Path(name)), commands.study(Path(name), Path(name))):
+    of = Path(name)
+    for action in (commands.budget(of), commands.contacts(of), commands.design(of), commands.study(of, of)):
         with pytest.raises(MissionError, match="does not exist"):
             executed(action.python)
 

@@ -1491,3 +1491,13 @@ def test_of_many_tables_the_first_fifty_are_listed(session, opened, count):
     names = [f"t{k}" for k in range(count)]
     session.change(session.draft.with_text('name = "x"\n' + "".join(f"[{name}]\nx = 1\n" for name in names)))
     assert [*opened().entries] == ["general", *names][:50]
+
+
+def test_the_table_that_is_shown_stays_marked_where_the_list_is_made_anew(session, opened):
+    page = opened()
+    with page.section:
+        page._show("beacon")
+        tables = list(page.entries)
+        session.change(session.draft.with_text(session.draft.text + "[more]\nunknown = 1\n"))
+        page._list()
+        assert list(page.entries) != tables and chosen(page) == ["beacon"]
