@@ -535,3 +535,26 @@ def test_numbers_left_of_a_second_variable_are_read_from_their_own_place_and_its
 
 def test_names_that_are_those_of_others_told_apart_stay_apart():
     assert reader._distinct(["x", "x", "_1_x", "x"]) == ("x", "_1_x", "_1__1_x", "_2_x")
+
+
+def test_a_file_that_is_not_read_says_why_in_full_and_what_to_save(tmp_path, monkeypatch):
+    whole, path = matrix("<", 6, (200, 1), b"x", doubles("<", np.arange(200.0))), tmp_path / "a.mat"
+    where = "the variable at byte 128: "
+    assert refused(write(path, "<", whole[:-9]), whole=True) == (
+        f"{where}an element is cut off, 9 bytes of it are missing",
+        "",
+    )
+    assert refused(write(path, "<", whole[:-9], compressed=True), whole=True) == (
+        f"{where}its compressed data are cut off",
+        "",
+    )
+    assert refused(write(path, "<", whole, compressed=True), most_bytes=len(whole) - 1, whole=True) == (
+        f"{where}it unpacks to more than {len(whole) - 1} bytes",
+        "save it without compression (-v6), or the part that is needed",
+    )
+    monkeypatch.setattr(reader, "MOST_ARRAYS", 3)
+    cells = matrix("<", 1, (3, 1), b"c", struct.pack("<II", 14, 0) * 3)
+    assert refused(write(path, "<", cells), whole=True) == (
+        f"{where}it holds more than 3 arrays",
+        "save the arrays that are needed alone",
+    )

@@ -137,3 +137,24 @@ def test_what_a_pulse_tells_of_its_slot_in_orders_and_backgrounds_unlike_each_ot
 )  # fmt: skip
 def test_the_least_pulse_of_a_share_in_orders_and_backgrounds_unlike_each_other(order, share, background, counts):
     assert least_pulse_counts(order, share, background) == pytest.approx(counts, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rate", "ratio", "order", "background", "asks"),
+    [(0.5, 0.1, 4, 40.0, True), (0.3, 0.2, 2, 40.0, True), (0.5, 0.2, 16, 5.0, False)],
+)
+def test_the_gain_in_background_is_the_bound_without_a_code_over_the_least_pulse(rate, ratio, order, background, asks):
+    """Both for each bit of the line; the error ratio is large, so that the order and it tell the terms of the bound."""
+    slot = background * math.log2(order) / order
+    union = math.log(order / ratio / 2.0)
+    said = rate * (1.0 + ratio * math.log2(ratio) + (1.0 - ratio) * math.log2(1.0 - ratio))
+    low, high = 1e-3, 1e4
+    for _ in range(80):
+        middle = math.sqrt(low * high)
+        told = soft_bits(order, middle, slot * rate) < said * math.log2(order)
+        low, high = (middle, high) if told else (low, middle)
+    expected = rate * (union + 2.0 * math.sqrt(slot * union)) / low
+    dark = rate * math.log(0.5 / ratio) / -math.log(1.0 - said)
+    assert Code(rate, ratio).ppm_counting(order, background) == pytest.approx(min(dark, expected), rel=1e-6)
+    assert Code(rate, ratio).ppm_counting(order) == pytest.approx(dark, rel=1e-9)
+    assert (expected < dark) is asks

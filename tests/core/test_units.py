@@ -683,3 +683,21 @@ def test_an_example_keeps_what_can_be_kept_of_a_value_and_can_be_read(value, uni
 @pytest.mark.parametrize(("value", "told"), [(-0.0, "0 m"), (0.0, "0 m"), (-1e-12, "-1 pm")])
 def test_nothing_has_no_sign(value, told):
     assert format_quantity(value, "m") == told
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "unit", "digits", "told"),
+    [
+        (5.0, 3.0, "V", 4, "5 V"),
+        (2.0 / 3.0, 7.0, "", 3, "0.667"),
+        (1.23456, 1.23451, "V", 4, "1.2346 V"),
+        (1.23461, 1.23457, "V", 4, "1.23461 V"),  # both are 1.235, and both are 1.2346
+        (1.23457, 1.23461, "V", 4, "1.23457 V"),
+        (0.0300004, 0.03, "s", 4, "30.0004 ms"),
+        (-59.99996, -60.0, "V", 3, "-59.99996 V"),
+        (12.3456789012, 12.3456789013, "kg", 4, "12.3456789 kg"),  # ten digits and no more
+        (2.0, 2.0, "Hz", 4, "2 Hz"),
+    ],
+)
+def test_what_breaks_a_limit_has_as_many_digits_as_tell_it_from_the_limit(value, limit, unit, digits, told):
+    assert units.format_beyond(value, limit, unit, digits) == told

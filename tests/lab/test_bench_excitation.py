@@ -735,3 +735,12 @@ def test_a_ramp_may_be_as_steep_as_the_limit_though_rounding_passes_it():
     assert made.step_samples == (12, 24) and made.samples == 30
     with pytest.raises(DesignError, match=r"rise makes the largest step one of 816\.7 V/s, .*would fit: at least 7 ms"):
         staircase(limits, levels_v=[1.0, 5.9, 1.0], dwell_s=5e-3, rise_s=6e-3)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_rounding_leaves_is_a_share_of_the_whole_range_of_a_drive_of_both_signs(side):
+    """From -10 V to 10 V a billionth of the range is 20 nV."""
+    limits = replace(LIMITS, drive_min_v=-10.0, drive_max_v=10.0)
+    assert steps(limits, levels_v=[0.0, side * (10.0 + 1.9e-8)]).drive[-1, 0] == side * (10.0 + 1.9e-8)
+    with pytest.raises(DesignError, match=r"levels has -?10 V, outside .*; would fit: -10 V to 10 V$"):
+        steps(limits, levels_v=[0.0, side * (10.0 + 2.1e-8)])

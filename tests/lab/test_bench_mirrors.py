@@ -378,3 +378,12 @@ def test_an_amplifier_slews_up_and_down_alike(side):
     volts = run.amplified(np.full(5, 5.0 + 2.0 * side))
     left = [2.0, 1.5, 1.0, math.exp(-0.5), math.exp(-1.0)]
     np.testing.assert_allclose(volts, 5.0 + side * (2.0 - np.array(left)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("rest_v", "command_v"), [(-1.0, 1.0), (1.0, -1.0), (-30.5, -28.5)])
+def test_an_amplifier_slews_by_how_far_it_has_to_go_wherever_it_rests(rest_v, command_v):
+    """2 V, of which the first takes 10 ms at 100 V/s; a command near 0 V is as far away as any other."""
+    run = _MirrorState(BenchMirror(), Amplifier(1 / (0.02 * math.pi), 100.0), rest_v, 5e-3)
+    left = np.array([2.0, 1.5, 1.0, math.exp(-0.5), math.exp(-1.0)])
+    expected = command_v + (rest_v - command_v) * left / 2.0
+    np.testing.assert_allclose(run.amplified(np.full(5, command_v)), expected, rtol=0, atol=1e-12)

@@ -1827,3 +1827,30 @@ def test_an_output_that_drifts_in_each_recording_follows_and_one_that_is_dead_in
         "a and 1 more: the output 'output' follows the drives in none of the recordings; check the sensor's wiring, or "
         "leave it out."
     )
+
+
+def test_an_output_ahead_of_the_second_of_two_drives_is_told_of_that_one():
+    one, other = multisine(1), multisine(2)
+    drives = np.column_stack((one, other))
+    message = refusal(drives, 0.2 * one + delayed(other, -3 / RATE_HZ), "lead")
+    assert "the output leads the drive 1 by " in message and "swap input and output" in message
+    message = refusal(drives[:, ::-1], 0.2 * one + delayed(other, -3 / RATE_HZ), "lead")
+    assert "the output leads the drive 0 by " in message
+
+
+def test_a_high_pass_behind_one_of_two_drives_is_not_told_from_a_zero_of_coupled_axes():
+    freq = np.fft.rfftfreq(N, 1 / RATE_HZ)
+    output = np.fft.irfft(np.fft.rfft(multisine(2)) * 1j * freq / (1j * freq + 1.0), N)
+    assert "as behind a high-pass" in notes(multisine(2), output)["lead"]
+    assert "lead" not in notes(np.column_stack((multisine(1), multisine(2))), output)
+
+
+def test_a_step_of_few_digits_is_told_with_them_alone():
+    times = np.arange(300.0)
+    times[120] = 120.2
+    _, (found,) = rate_of_time("f", "'t'", times, lambda row: f"row {row}")
+    scatter = 100 * math.sqrt(2 * 0.2**2 / 299)
+    assert found.message == (
+        f"'t': the steps scatter by {scatter:.2g} % rms of 1 s, most at row 120 (1.2 s); record with a hardware clock, "
+        "or resample to a constant step"
+    )

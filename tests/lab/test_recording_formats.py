@@ -25,7 +25,7 @@ from microrad.core.units import printable
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
 from microrad.lab.recording.formats import text as text_format
 from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels_of, indexed, stated_rate
-from microrad.lab.recording.formats.hdf5 import _lzf_bytes, unusable_dataset
+from microrad.lab.recording.formats.hdf5 import _lzf_bytes, _unpacked_bytes, unusable_dataset
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.formats.source import Container, StatedRate, is_time_name, time_unit
 from microrad.lab.recording.formats.tdms import _check_scales, _Listener, check_structure
@@ -2452,3 +2452,41 @@ def test_a_time_in_an_unknown_unit_of_its_name_is_refused_with_that_unit(tmp_pat
     np.savez(path, **{"drive": DRIVE, "output": OUTPUT, name: np.arange(DRIVE.size) / RATE_HZ})
     with pytest.raises(RecordingError, match=r"the time is in 'h'; convert it to one of s, "):
         read_recording(path, "drive", "output", time=name)
+
+
+@pytest.mark.parametrize(
+    ("data", "filters", "stated", "size"),
+    [
+        (b"abc", [], 3, 3),
+        (b"x" * 44, [3], 40, 40),
+        (zlib.compress(b"x" * 40) + bytes(4), [2, 1, 3], 40, 40),
+        (zlib.compress(b"x" * 40), [2, 1, 3], 40, 0),  # its own last four bytes are taken for the checksum
+        (zlib.compress(b"x" * 40), [1], 39, 40),
+        (b"\x00a" + bytes(4), [32000, 3], 1, 1),
+        (b"\x00a\x01", [32000, 3], 1, 0),  # shorter than a checksum
+        (b"", [1, 3], 8, 0),
+    ],
+)
+def test_a_checksum_behind_a_packed_piece_is_none_of_its_bytes(data, filters, stated, size):
+    assert _unpacked_bytes(data, filters, stated) == size
+
+
+def test_names_with_an_underscore_between_digits_are_no_numbers(tmp_path):
+    (tmp_path / "a.csv").write_text("1_000,2_5,time\n" + "1.5,2.5,0.001\n" * 300)
+    source = text_format.TextSource(tmp_path / "a.csv")
+    assert source.names == ("1_000", "2_5", "time") and source.layout.first_line == 2
+
+
+@pytest.mark.parametrize(
+    ("header", "names", "units"),
+    [
+        ("V,mrad\n", ("V", "mrad"), ("", "")),  # there are no other names
+        ("V,mrad\ndrive,angle\n", ("drive", "angle"), ("V", "mrad")),
+        ("drive,angle\n[V],(mrad)\n", ("drive", "angle"), ("V", "mrad")),
+        ("drive [mV],angle\na,b\n", ("drive [mV]", "angle"), ("mV", "")),
+    ],
+)
+def test_a_row_of_units_is_one_beside_the_names(tmp_path, header, names, units):
+    (tmp_path / "a.csv").write_text(header + "1.5,2.5\n" * 300)
+    source = text_format.TextSource(tmp_path / "a.csv")
+    assert (source.names, source.units) == (names, units)

@@ -630,3 +630,19 @@ def test_of_a_periodic_record_whole_periods_are_kept_where_there_are_two(values,
     samples, period = values
     cut = whole_periods(recording(np.arange(float(samples)), period=period))
     assert (cut.samples, cut.output.shape[0], cut.period_samples) == (kept[0], kept[0], kept[1])
+
+
+def test_where_all_are_broadband_those_that_do_not_say_so_are_the_loops_as_well():
+    small, large, other = (
+        recording(chirp(0.3), name="small"),
+        recording(multisine(5.0), name="large"),
+        recording(multisine(2.0, seed=2), 1000.0, name="other"),
+    )
+    found = roles([replace(small, role="broadband"), large, other])
+    assert [[r.path for r in of] for of in found] == [
+        ["small", "large"],
+        ["small", "large", "other"],
+        ["large", "other"],
+    ]
+    found = roles([large, replace(other, role="broadband")])
+    assert [[r.path for r in of] for of in found] == [["large"], ["large", "other"], ["large"]]

@@ -2,6 +2,7 @@
 
 import pickle
 import re
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -1356,3 +1357,54 @@ def test_fits_that_fail_are_told_by_model_and_progress_counts_the_starts_of_each
     fails.add("bouc_wen")
     with pytest.raises(IdentificationError, match=r"^no bouc_wen$"):
         made.fit_all(models, lambda *told: None, heard.append)
+
+
+@pytest.mark.parametrize("with_eq_3", [True, False])
+def test_models_side_by_side_begin_in_two_rounds_and_are_heard_of_in_their_own_order(monkeypatch, with_eq_3):
+    """Twelve starts of Eq. 3, which goes first; the forms that begin at it come last, the shortest of them before."""
+
+    class Eq3(SimpleNamespace):
+        pass
+
+    begun, starts = [], []
+
+    def fitted(self, model, poles, progress):
+        begun.append((model, vars(self).get("_static_start")))
+        if model in ("linear", "bouc_wen_creep"):
+            raise IdentificationError(f"no {model}.")
+        return (Eq3 if model.startswith("bouc_wen") else SimpleNamespace)(name=model, poles=poles)
+
+    def start(self, progress, **how):
+        starts.append(len(begun))
+        raise IdentificationError("no Eq. 3")
+
+    @contextmanager
+    def in_turn(jobs, on_turn):
+        yield lambda: [on_turn(number) or job() for number, job in enumerate(jobs)]
+
+    monkeypatch.setattr(candidates, "BoucWenFit", Eq3)
+    monkeypatch.setattr(candidates, "shared_out", in_turn)
+    monkeypatch.setattr(candidates.Candidates, "_fit", fitted)
+    monkeypatch.setattr(candidates.Candidates, "_fit_eq_3", start)
+    models = ["prandtl_ishlinskii", "linear", "bouc_wen_creep", "bouc_wen_admissible", "bouc_wen_classical", "bouc_wen"]
+    if not with_eq_3:
+        models.pop()
+    one, told, heard = candidates_of(), [], []
+    fits, failed = one.fit_all(models, lambda *call: told.append(call), heard.append, side_by_side=True)
+    asked = [model for model in models if model not in ("linear", "bouc_wen_creep")]
+    assert [(fit.name, fit.poles) for fit in fits] == [(model, None) for model in asked] and heard == fits
+    assert [(each.model, each.reason) for each in failed] == [
+        ("linear", "no linear."),
+        ("bouc_wen_creep", "no bouc_wen_creep."),
+    ]
+    eq_3 = ["bouc_wen_admissible", "bouc_wen"] if with_eq_3 else ["bouc_wen_admissible"]
+    first = [*eq_3, "prandtl_ishlinskii", "linear"]
+    order = [*first, "bouc_wen_classical", "bouc_wen_creep"]
+    assert [model for model, _ in begun] == order
+    efforts = [12 if model in ("bouc_wen", "bouc_wen_admissible") else 1 for model in order]
+    total = sum(efforts)
+    expected = [(sum(efforts[:k]), total, f"fitting {model}") for k, model in enumerate(order)]
+    assert told == [*expected, (total, total, models[-1])] and total == (28 if with_eq_3 else 16)
+    known = fits[-1] if with_eq_3 else None  # made in the first round, where it is asked for
+    assert [at for _, at in begun] == [None] * len(first) + [known] * 2
+    assert starts == ([] if with_eq_3 else [len(first)])

@@ -120,3 +120,12 @@ def test_recordings_that_are_not_fitted_may_turn_no_farther_either(fitted):
     given = ([loop, far], [recording_from_arrays(WAVE[2:], 0.1 * WAVE[2:], 1000.0)]) if fitted else ([loop], [far])
     with pytest.raises(IdentificationError, match=r"^far\.csv: the output 'output' moves by 3 rad, a tilt of 3 rad"):
         identify(given[0], validation=given[1], output_unit="rad")
+
+
+def test_an_angle_stands_over_nothing_though_a_lever_arm_is_given():
+    with pytest.raises(IdentificationError) as caught:
+        check_travel([recorded(0.01), recorded(2000.0, "far.csv")], "mrad", 0.05, [(0.0, 0.0), (0.1, 0.0)])
+    assert str(caught.value) == (
+        "far.csv: the output 'output 1' moves by 2000 mrad, a tilt of 2 rad, and no mirror turns by more than 1.571 "
+        "rad (a quarter turn); correct the unit of the output (--output-unit, output_unit)."
+    )
