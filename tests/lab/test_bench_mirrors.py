@@ -387,3 +387,14 @@ def test_an_amplifier_slews_by_how_far_it_has_to_go_wherever_it_rests(rest_v, co
     left = np.array([2.0, 1.5, 1.0, math.exp(-0.5), math.exp(-1.0)])
     expected = command_v + (rest_v - command_v) * left / 2.0
     np.testing.assert_allclose(run.amplified(np.full(5, command_v)), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("z", [-0.0099, -0.0101, -1e-9, -0.007 + 0.0069j, -0.5 + 2.0j])
+@pytest.mark.parametrize("step_s", [2.5e-6, 40.0])
+def test_a_step_of_a_line_keeps_its_digits_where_it_is_short(z, step_s):
+    """Of the sums of z^k / (k + 1)! and z^k / (k + 2)!, which cancel nowhere."""
+    decay, start, end = _straight_line(np.array(z / step_s), step_s)
+    held, ramp = (sum(z**k / math.factorial(k + more) for k in range(30)) for more in (1, 2))
+    assert complex(decay) == pytest.approx(1.0 + z * held, rel=1e-12)
+    assert complex(end) == pytest.approx(step_s * ramp, rel=1e-12)
+    assert complex(start) == pytest.approx(step_s * (held - ramp), rel=1e-12)

@@ -54,7 +54,7 @@ from microrad.lab.identify.selection import candidates, choice, predictions
 from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.identify.selection.warnings import _FLIPPED
 from microrad.lab.identify.statistics import colour_inflation, may_be_chance
-from microrad.lab.recording import read_recording, recording_from_arrays
+from microrad.lab.recording import Recording, read_recording, recording_from_arrays
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, PrandtlIshlinskii
 from microrad.mission.file import load_mirror
 from places import DATA, ROOT
@@ -1779,3 +1779,36 @@ def test_what_is_said_of_a_fit_of_eq_3_counts_both_records_and_what_each_adds_by
     assert fit.agreeing_starts == 2 and fit.constrained is False and fit.name == "bouc_wen"
     assert fit.slope_after_reversal_rad_per_v == pytest.approx(1e-4 - 2e-5 * 2 * 1.5 / 1.1)
     assert fit.lowest_slope_rad_per_v == pytest.approx(bouc_wen_of.lowest_slope(problem, values))
+
+
+def test_plays_are_correlated_over_what_was_fitted_alone():
+    """Two loops up to their splits; a record for validation, of which nothing was fitted, adds nothing to them."""
+    time = np.arange(600) * 0.05
+    fit = PrandtlIshlinskiiFit(
+        thresholds_v=np.array([0.0, 0.5, 1.5, 3.0]),
+        weights_rad_per_v=np.array([0.0, 2e-4, 1e-4, 5e-5]),
+        standard_errors_rad_per_v=np.array([np.nan, 1e-6, 3e-6, 2e-6]),
+        sign=1,
+        offsets_rad=(0.0, 0.0),
+        rate_limit_v_per_s=4.0,
+        units=Units(),
+        colour_inflation=1.0,
+        condition_number=1.0,
+        residual_rms_percent=1.0,
+        samples_used=1,
+    )
+
+    def covariance(*given):
+        loops = [Recording("r", "", u[:, None], u[:, None], 50.0, ("u",), ("y",)) for u, _, _ in given]
+        seen = [predictions.Prediction(u, u, start, split, 0) for u, start, split in given]
+        return mirror_file._play_covariance(fit, SimpleNamespace(recordings=loops, predictions=[seen]))
+
+    one, two = 4.0 * np.sin(time), 2.0 + 3.0 * np.sin(1.7 * time)
+    jump = np.concatenate([one[:400], 50.0 * one[400:]])
+    numbers, found = covariance((one, 20, 400), (two, 30, 500))
+    assert numbers == {f"prandtl_ishlinskii.weights.{k}": w for k, w in ((2, 2e-4), (3, 1e-4), (4, 5e-5))}
+    assert_allclose(np.diag(found), [1e-12, 9e-12, 4e-12])
+    again, same = covariance((jump, 20, 400), (two, 30, 500), (9.0 * two, 100, 0))
+    assert again == numbers
+    assert_allclose(same, found, rtol=1e-9)
+    assert np.abs(covariance((one, 20, 400), (two, 30, 300))[1] - found).max() > 1e-14

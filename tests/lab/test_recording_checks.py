@@ -1854,3 +1854,47 @@ def test_a_step_of_few_digits_is_told_with_them_alone():
         f"'t': the steps scatter by {scatter:.2g} % rms of 1 s, most at row 120 (1.2 s); record with a hardware clock, "
         "or resample to a constant step"
     )
+
+
+@pytest.mark.parametrize(
+    ("values", "step"),
+    [
+        ([-1000.0, math.nextafter(-1000.0, 0.0), -999.0, -997.0], 1.0),  # rounding of numbers below 0
+        ([0.1, math.nextafter(0.1, 1.0), 0.2, 0.4], 0.1),
+        ([0.0, 6e6, 6e6 + 1.0, 1.1e7], 0.0),  # the whole span is too many steps, though not that behind the second
+        ([0.0, 6e6, 6e6 + 1.0, 0.9e7], 1.0),
+    ],
+)
+def test_a_step_is_told_from_rounding_by_the_size_and_from_chance_by_the_whole_span(values, step):
+    assert quantum(np.array(values)[::-1]) == pytest.approx(step, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("count", "run", "beside", "repeats", "step", "gather"),
+    [
+        (10, 1, 0, 1, 0.0, False),
+        (11, 1, 0, 1, 0.0, True),
+        (11, 1, 2, 1, 0.0, True),
+        (30, 1, 5, 1, 0.0, True),
+        (30, 1, 6, 1, 0.0, False),  # of which there are five times as many as are near the limit
+        (30, 3, 0, 1, 0.0, False),
+        (32, 4, 0, 1, 0.0, False),
+        (30, 2, 0, 6, 0.02, True),
+        (30, 2, 0, 7, 0.0, False),  # another value comes more often than a fifth of them
+        (30, 2, 0, 1, 0.0201, False),
+        (900, 1, 0, 1, 0.0, True),
+        (901, 1, 0, 1, 0.0, False),  # more than three of ten
+    ],
+)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_samples_gather_at_a_limit_up_to_each_bound(count, run, beside, repeats, step, gather, side):
+    """3000 samples from -1 to 1, all unlike; so many at the limit in such runs, others within 0.02 of it."""
+    values = np.linspace(-1.0, 0.97, 3000)
+    at = 3 * (1 + run) * np.arange(count // run)[:, None] // (1 if run > 1 else 2) + np.arange(run)
+    at = at.ravel()
+    free = np.setdiff1d(np.arange(1, 2999), at)
+    values[free[:repeats]] = values[free[0]]
+    values[free[100 : 100 + beside]] = 0.985 + 1e-4 * np.arange(beside)
+    values[at] = 1.0
+    values[2999] = -1.0
+    assert channel._piles_up(side * values, at, side, step, 2.0) is gather

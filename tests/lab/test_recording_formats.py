@@ -24,7 +24,7 @@ from scipy.sparse import csc_array
 from microrad.core.units import printable
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
 from microrad.lab.recording.formats import text as text_format
-from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels_of, indexed, stated_rate
+from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels_of, indexed, rates_of, stated_rate
 from microrad.lab.recording.formats.hdf5 import _lzf_bytes, _unpacked_bytes, unusable_dataset
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.formats.source import Container, StatedRate, is_time_name, time_unit
@@ -2490,3 +2490,30 @@ def test_a_row_of_units_is_one_beside_the_names(tmp_path, header, names, units):
     (tmp_path / "a.csv").write_text(header + "1.5,2.5\n" * 300)
     source = text_format.TextSource(tmp_path / "a.csv")
     assert (source.names, source.units) == (names, units)
+
+
+def test_scalars_state_the_rates_of_their_own_group_in_their_order():
+    def variable(name, values):
+        values = np.asarray(values)
+        return Variable(name, values.shape, values.dtype, values.__getitem__)
+
+    found = rates_of(
+        [
+            variable("b/fs", [[500.0]]),
+            variable("dt", 0.004),
+            variable("b/gain", 3.0),
+            variable("a/in/Rate_Hz", np.array([2000], dtype=np.uint16)),
+            variable("b/DT", np.array([[[0.002]]], dtype=np.float32)),
+            variable("b/ts", [1.0, 2.0]),
+            variable("a/fs", 4.0 + 0.0j),
+            variable("a/rate", True),
+            variable("a/sample_rate", np.zeros((1, 0))),
+            variable("a/step_s", 0),
+        ]
+    )
+    step_s = float(np.float32(0.002))
+    assert found == {
+        "b": (StatedRate(500.0, "b/fs = 500 Hz"), StatedRate(1 / step_s, "b/DT = 0.002 s")),
+        "": (StatedRate(250.0, "dt = 0.004 s"),),
+        "a/in": (StatedRate(2000.0, "a/in/Rate_Hz = 2000 Hz"),),
+    }

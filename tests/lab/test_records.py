@@ -380,3 +380,11 @@ def test_the_noisiest_of_two_drives_is_told_in_either_order():
     calm, noisy = (of(drive, wave, RATE, name) for name, drive in (("a", wave), ("b", wave + noise)))
     one, other = (noisiness(si_records(given, Units())) for given in ((calm, noisy), (noisy, calm)))
     assert one == other == pytest.approx(np.sqrt(2) * 0.01 * RATE / PEAK, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("sweep", "fastest"),
+    [([0.0, 5.0], (5.0, 1)), ([5.0, 0.0], (5.0, 1)), ([1.0, 7.0, 6.0], (6.0, 1)), ([7.0, 2.0, 3.0], (5.0, 1))],
+)
+def test_a_sweep_of_a_step_or_two_goes_from_its_first_sample_to_its_last(sweep, fastest):
+    assert records._fastest_tenth(np.array(sweep)) == fastest

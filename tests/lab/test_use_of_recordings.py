@@ -311,3 +311,14 @@ def test_a_share_that_is_none_is_told_in_all_words(hold_out, validated):
         f"--hold-out (hold_out) is {hold_out}; give the share of each recording kept for the check, between 0 and 1, "
         "e.g. 0.5, or 0 with recordings for validation."
     )
+
+
+@pytest.mark.parametrize(("rest", "split", "told"), [(499, 500, False), (500, 501, False), (501, 502, True)])
+def test_a_split_one_sample_behind_the_middle_is_still_in_the_middle(rest, split, told):
+    """A drive that is at 10 V for the first time behind so many samples."""
+    drive = of_drive([0] * rest + [10] * (1000 - rest))
+    assert split_points([drive], None, validated=False) == [split]
+    words = (
+        "record: the last 50 % are held out instead of half, because only then has the drive swept its range in the "
+    )
+    assert split_warnings([drive], [split], 1.0) == ([f"{words}fitted part."] if told else [])
