@@ -16,7 +16,7 @@ import h5py
 import lvm_read
 import numpy as np
 import pytest
-from nptdms import ChannelObject, TdmsWriter
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from nptdms.log import log_manager
 from scipy.io import savemat
 from scipy.sparse import csc_array
@@ -28,7 +28,7 @@ from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels
 from microrad.lab.recording.formats.hdf5 import _lzf_bytes, _unpacked_bytes, unusable_dataset
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
 from microrad.lab.recording.formats.source import Container, StatedRate, is_time_name, time_unit
-from microrad.lab.recording.formats.tdms import _check_scales, _Listener, check_structure
+from microrad.lab.recording.formats.tdms import TdmsSource, _check_scales, _Listener, check_structure
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
 from places import ROOT
@@ -2517,3 +2517,26 @@ def test_scalars_state_the_rates_of_their_own_group_in_their_order():
         "": (StatedRate(250.0, "dt = 0.004 s"),),
         "a/in": (StatedRate(2000.0, "a/in/Rate_Hz = 2000 Hz"),),
     }
+
+
+@pytest.mark.parametrize("place", ["channel", "group", "file"])
+def test_too_many_scales_are_refused_wherever_a_tdms_file_states_them_of_the_second_channel(tmp_path, place):
+    """What stands at a group or at the file holds for its channels."""
+    stated = {"NI_Number_Of_Scales": 1001}
+    objects = [
+        RootObject(stated if place == "file" else {}),
+        GroupObject("calm"),
+        ChannelObject("calm", "y", np.arange(3.0)),
+        GroupObject("bench", stated if place == "group" else {}),
+        ChannelObject("bench", "u", np.arange(3.0), stated if place == "channel" else {}),
+    ]
+    path = tmp_path / "a.tdms"
+    with TdmsWriter(path) as writer:
+        writer.write_segment(objects)
+    named = "calm/y" if place == "file" else "bench/u"
+    with pytest.raises(RecordingError) as refused:
+        TdmsSource(path)
+    assert str(refused.value) == (
+        f"{path}: this cannot be read as a TDMS file ('{named}' states 1001 scales); the file is damaged or truncated: "
+        "copy it again from its source."
+    )

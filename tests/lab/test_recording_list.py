@@ -810,3 +810,22 @@ def test_one_drive_and_two_outputs_have_a_unit_a_place_and_a_sign_for_each(tmp_p
     assert "positions has 1 places and there are 2 outputs, y, x; give one place for each, in their order." in refusal(
         tmp_path, f'positions = [["1 mm", "2 mm"]]\n{entry}'
     )
+
+
+def test_recordings_of_one_drive_have_the_same_sensors_and_each_its_own_data(tmp_path):
+    write_csv(tmp_path / "a.csv", "t,ux,uy,x,y")
+    write_csv(tmp_path / "b.csv", "t,ux,uy,x,z")
+    common = (
+        'input = "ux"\naccept = ["drift", "lead", "dead"]\n\n[recording.a]\nfile = "a.csv"\noutput = ["x", "y"]\n\n'
+    )
+    second = '[recording.b]\nfile = "b.csv"\noutput = '
+    (a, b), path = (tmp_path / "a.csv", tmp_path / "b.csv"), tmp_path / "list.toml"
+    assert len(read_list(write_list(tmp_path, f'{common}{second}["x", "z"]')).recordings) == 2
+    assert refusal(tmp_path, f'{common}{second}"x"') == (
+        f"{path}: {b}: 1 input and 1 output, where {a} has 1 and 2; name the same channels in each recording, in the "
+        "same order."
+    )
+    (tmp_path / "b.csv").write_bytes(a.read_bytes())
+    assert refusal(tmp_path, f'{common}{second}["x", "y"]') == (
+        f"{path}: {b}: the same data as {a}; give each recording once, and for validation one that is not fitted."
+    )
