@@ -2540,3 +2540,17 @@ def test_too_many_scales_are_refused_wherever_a_tdms_file_states_them_of_the_sec
         f"{path}: this cannot be read as a TDMS file ('{named}' states 1001 scales); the file is damaged or truncated: "
         "copy it again from its source."
     )
+
+
+@pytest.mark.parametrize(
+    ("preamble", "header"), [("setting {}; on", "u,y"), ("# {},{},{}", "u,y"), ("a word {}", "u v,y")]
+)
+def test_a_text_is_laid_out_as_its_last_lines_are_however_many_others_stand_before(tmp_path, preamble, header):
+    """250 lines before the names, more than are judged."""
+    before = [preamble.format(k, k + 1, k + 2) for k in range(250)]
+    (tmp_path / "a.csv").write_text("\n".join([*before, header, *(f"{k}.5,{-k}" for k in range(210))]) + "\n")
+    found = text_format.layout_of(tmp_path / "a.csv")
+    assert (found.delimiter, found.columns, found.first_line) == (",", 2, 252)
+    assert found.names == tuple(header.split(","))
+    source = text_format.TextSource(tmp_path / "a.csv")
+    assert [values[-1] for values in source.load([0, 1])] == [209.5, -209.0] and source.place(2) == "line 254"
