@@ -591,3 +591,19 @@ def test_what_follows_the_command_is_the_predictor_of_the_states_by_white_noise_
         K = s.A @ P @ s.C.T / (s.C @ P @ s.C.T + 0.49)
         P = s.A @ P @ s.A.T + s.B @ s.B.T - K @ s.C @ P @ s.A.T
     assert_allclose(classical.follow_command(s), K, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ((160.0, 80.0, 80.0), "the line at 80 Hz is given twice; give each line one peak filter"),
+        ((40.0, 622.08, 80.0, 622.08), "the line at 622.08 Hz is given twice; give each line one peak filter"),
+        ((40.0, 2600.0, 80.0), "a peak filter for a line at 2600 Hz: "),
+        ((40.0, 80.0, 2600.0, 80.0), "a peak filter for a line at 2600 Hz: "),
+    ],
+)
+def test_a_line_that_no_peak_can_take_out_is_named_wherever_it_stands(lines, words):
+    family = peak_family(lines)
+    with pytest.raises(ValueError) as refused:
+        family.build(PLAIN, np.array([216.0, 731.0, 50.0, 1e-3]))
+    assert str(refused.value).startswith(words)

@@ -477,3 +477,11 @@ def test_an_inverse_of_several_actuators_keeps_which_element_belongs_to_which():
     assert_allclose(arrays["inverse_widening"], found.widening)
     plain = control.inverse_arrays(control.Inverse((1.0, 2.0, 3.0)), 0.2)
     assert_allclose(plain["inverse_widening"], [[0, inf]] * 3)
+
+
+def test_a_mirror_of_several_axes_has_no_sampled_plant_and_is_told_with_both_its_counts(straight):
+    one = mirror.combine(straight, straight, straight)
+    three = replace(one, name="tripod", C=one.C[:2], D=one.D[:2], K=one.K[:2])
+    with pytest.raises(ValueError) as refused:
+        control.sampled_plant(three, IDEAL_DRIVE, Timing(PERIOD, 1, 0))
+    assert str(refused.value) == "mirror 'tripod' has 3 actuators and 2 axes: give one axis at a time"

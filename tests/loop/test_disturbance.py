@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from math import exp, inf, nan, pi, sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -1516,4 +1517,70 @@ def test_a_first_row_that_is_no_number_is_a_row_in_whatever_letters_and_no_headi
         typed("Hz rad^2/Hz", first, "1 2", "2 2", "3 4")
     assert str(refused.value) == (
         "measured.csv, line 2: (nan Hz, 3 rad^2/Hz) holds a number that is not finite; remove the row"
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: SpectralLine(inf, 2.0), "amplitude of a spectral line is inf rad; give a finite number, zero or "
+         "above"),
+        (lambda: SpectralLine(1e-6, inf), "frequency of a spectral line is inf Hz; give a finite number above zero"),
+        (lambda: first_order(inf, 2.0, convention="radial"), 'level of "first order" is inf rad^2/Hz; give a finite '
+         "number, zero or above"),
+        (lambda: body_pointing(inf, 3, 1), "body pointing error is inf rad; give a finite number, zero or above"),
+        (lambda: Reference(0, 0, 1, 1e-6, inf), "sine_freq_hz of a pointing reference is inf; give a finite number"),
+        (lambda: wheels(9, (2, 3), (1e-9, inf), convention="radial"), "coefficient of the wheel's harmonic 3 is inf "
+         "rad/Hz^2; give a finite number, zero or above"),
+        (lambda: fit_bands((0, 1, 2), (1, inf), convention="radial", name="rows"), '"rows": rms between 1 and 2 Hz is '
+         "inf rad; give a finite number above zero"),
+    ],
+)  # fmt: skip
+def test_what_has_no_end_is_no_number_of_a_disturbance(call, words):
+    with pytest.raises(ValueError) as refused:
+        call()
+    assert str(refused.value) == words
+    assert SpectralLine(0.0, 2.0).amplitude_rad == first_order(0.0, 2.0, convention="radial").rms_rad == 0.0
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("1,5\t2,5", '"1,5\t2,5" is not two numbers; decimals take a point'),
+        ("1.5\t\t2.5", "3 columns; give two, frequency (Hz) and density, with a decimal point"),
+        ("1.5\t2.5\t", None),
+        ("1 5\t2.5", '"1 5\t2.5" is not two numbers; decimals take a point'),
+        ("1.5 ;\t2.5", None), ("1.5 , 2.5", None), ("1.5 \t 2.5", None), ("1.5   2.5", None),
+    ],
+)  # fmt: skip
+def test_columns_are_told_apart_by_the_first_of_semicolon_tab_and_comma_that_a_row_has(row, words):
+    rows = "Hz rad^2/Hz", "1\t4", row, "2\t3", "5\t0.1"
+    if words is None:
+        assert typed(*rows)[0].tolist() == [1.0, 1.5, 2.0, 5.0]
+        return
+    with pytest.raises(ValueError) as refused:
+        typed(*rows)
+    assert str(refused.value) == f"measured.csv, line 3: {words}"
+
+
+@pytest.mark.parametrize(
+    ("achieved", "words"),
+    [
+        ([0.9, 1.8, 3.6], "1.2 times the given rms between 3 and 10 Hz"),
+        ([1.03, 1.6, 3.3], "0.8 times the given rms between 1 and 3 Hz"),
+        ([1.3, 2.0, 2.4], "1.3 times the given rms between 0 and 1 Hz"),
+        ([1.049, 1.91, 3.14], None),
+    ],
+)
+def test_of_several_bands_the_one_that_is_farthest_off_either_way_is_named(achieved, words):
+    fit = SimpleNamespace(
+        achieved_rms_rad=np.array(achieved), requested_rms_rad=np.array([1.0, 2.0, 3.0]), edges_hz=[0.0, 1.0, 3.0, 10.0]
+    )
+    if words is None:
+        assert fits._refuse_poor_bands(fit, "rows") is None
+        return
+    with pytest.raises(ValueError) as refused:
+        fits._refuse_poor_bands(fit, "rows")
+    assert str(refused.value).startswith(
+        f'"rows": no filter of a few terms has these rms values; the nearest has {words}, and 5 % is allowed: '
     )

@@ -13,7 +13,7 @@ from design_plants import axis_plant
 from microrad.core import kernels, lti
 from microrad.loop.control import analysis, lqg
 from microrad.loop.control.lqg import LQG, LQG_OF_AXES, Weights
-from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, WholePlant
+from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, WholePlant, once_per_plant
 
 PERIOD = 2e-4
 near = partial(pytest.approx, abs=0.0, rel=1e-6)  # variances are far below the default of 1e-12
@@ -459,3 +459,63 @@ def test_what_a_design_of_several_axes_knows_has_a_walk_on_each_axis_of_the_size
     assert_allclose(found.residual, np.hstack([s.C[:2], np.eye(2)]))
     assert_allclose(found.seen, np.hstack([s.C[2:], np.eye(2)]))
     assert (found.sensors, found.moved.tolist()) == ([0, 1], [True] * 4 + [False] * 2)
+
+
+def test_what_is_known_of_a_plant_is_that_of_the_weights_that_are_asked_for():
+    """One weight after the other is changed, and changed back, on one plant and on a new one each time."""
+    first = Weights(1e-2, 1.0, 1e-3, 0.5)
+    changes = ({}, {"sensor_noise": 3.0}, {"command_noise_v": 4e-3}, {"walk": 2.0}, {"command": 5e-2}, {})
+    plant = axis_plant(resonance=(900.0, 0.02))
+    found = [lqg.lqg_controller(plant, replace(first, **change)).system for change in changes]
+    alone = [lqg.lqg_controller(replace(plant), replace(first, **change)).system for change in changes]
+    for one, other in zip(found, alone, strict=True):
+        for key in "ABCD":
+            assert_allclose(getattr(one, key), getattr(other, key), rtol=1e-9, atol=1e-12)
+    unlike = {tuple(np.round(one.D[0] / found[0].D[0], 6)) for one in found}
+    assert len(unlike) == len(changes) - 1
+
+
+def test_answers_are_kept_for_a_few_plants_and_each_has_its_own():
+    asked = []
+
+    def name_of(plant):
+        """What a plant is called."""
+        asked.append(plant[0])
+        return f"plant {plant[0]}"
+
+    kept = once_per_plant(name_of)
+    assert (kept.__name__, kept.__doc__) == ("name_of", "What a plant is called.")
+    plants = [[n] for n in range(6)]
+    for of in (plants[0], plants[1], plants[0], plants[1], plants[2], plants[3], plants[0]):
+        assert kept(of) == f"plant {of[0]}"
+    assert asked == [0, 1, 2, 3]
+    assert kept([0]) == "plant 0"  # another plant, however alike
+    assert asked == [0, 1, 2, 3, 0]
+    assert [kept(of) for of in plants] == [f"plant {n}" for n in range(6)]
+    assert asked == [0, 1, 2, 3, 0, 0, 1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_what_is_used_in_the_end_has_coarser_numbers_than_what_a_search_looks_at(axes):
+    if axes == 1:
+        family, plant, values = LQG, axis_plant(resonance=(900.0, 0.02)), np.array([1e-2, 1.0, 1e-3])
+    else:
+        two = [axis_plant(gauge=False, noise_rad=n, amplifier_hz=a).system for n, a in ((1e-6, 1e3), (3e-6, 700.0))]
+        order = [0, 3, 1, 4, 2, 5]  # commands, disturbances, noise
+        B, D = block_diag(*(s.B[:, :3] for s in two)), block_diag(*(s.D[:2, :3] for s in two))
+        C = block_diag(*(s.C[:2] for s in two))[[0, 2, 1, 3]]
+        s = lti.StateSpace(block_diag(*(s.A for s in two)), B[:, order], C, D[[0, 2, 1, 3]][:, order])
+        family, plant, values = LQG_OF_AXES, WholePlant(PERIOD, s, 2, 2, 0.089e-3), np.array([1e-2, 1.0, 1e-3])
+    smooth, used = family.build(plant, values), family.final(plant, values)
+    for key in "ABCD":
+        fine, coarse = getattr(smooth.system, key), getattr(used.system, key)
+        assert np.array_equal(coarse, lti.to_bits(coarse, 32))
+        assert not np.array_equal(fine, lti.to_bits(fine, 32))
+        assert_allclose(coarse, fine, rtol=0.0, atol=1e-5 * np.max(np.abs(fine)))
+    gains = []
+    for made in (smooth, used):
+        gain = made.system.B - made.anti_windup @ made.system.D
+        gains.append(gain[np.abs(gain) > 1e-5 * np.max(np.abs(gain))])
+    off = [np.max(np.abs(gain / lti.to_bits(gain, 24) - 1.0)) for gain in gains]
+    assert off[0] > 1e-9 > off[1]
+    assert used.anti_windup.tolist() == smooth.anti_windup.tolist()

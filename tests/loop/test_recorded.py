@@ -844,3 +844,33 @@ def test_a_recording_is_simulated_alone_without_any_noise_of_its_sensors_and_tol
     assert still.at(np.array([0.0, 9.0])).tolist() == [0.0, 0.0]
     assert played._simulated(replace(parts, gauge=None), "controller", moved, "span") == 4.0
     assert asked[1][0].gauge is None
+
+
+@pytest.mark.parametrize(
+    ("step_s", "fits"), [(1e-4, True), (0.99e-4, False), (0.01, True), (0.0101, False), (1e300, False), (1e-300, False)]
+)
+def test_a_motion_is_played_so_many_times_slower_or_faster_and_no_more(monkeypatch, step_s, fits):
+    monkeypatch.setattr(recorded, "_MOST_APART", 10.0)
+    motion = recorded_motion(MOVING, 1e-3, "tracker")
+    if fits:
+        assert resampled(motion, step_s).size == math.floor(motion.duration_s / step_s * (1 + 1e-12)) + 1
+        return
+    with pytest.raises(ValueError) as refused:
+        resampled(motion, step_s)
+    assert str(refused.value) == (
+        f'"tracker": 400 samples, 0.001 s apart, are not played every {step_s:g} s: rates may differ 10 times, and '
+        "50000000 steps are the most; cut the recording"
+    )
+
+
+def test_a_recording_lasts_from_its_first_sample_to_its_last_and_its_drift_is_none_in_the_middle():
+    motion = recorded_motion(MOVING, 2e-3, "tracker")
+    assert (motion.duration_s, motion.half_rate_hz) == (pytest.approx(0.798), pytest.approx(250.0))
+    assert motion.trend_rad(np.array([0.399])) == pytest.approx(np.mean(MOVING), rel=1e-12)
+    ends = motion.trend_rad(np.array([0.0, 0.798]))
+    assert ends - np.mean(MOVING) == pytest.approx(motion.slope_rad_s * np.array([-0.399, 0.399]), rel=1e-9)
+    assert resampled(motion, 2e-3) is motion.samples_rad
+    below = recorded_motion(-5.0 - 1e-9 * MOVING, 2e-3)
+    assert below.mean_rad == pytest.approx(-5.0 - 1e-9 * np.mean(MOVING), rel=1e-12)
+    with pytest.raises(ValueError, match=r'"recording" stands still at -5 rad'):
+        recorded_motion(-5.0 - 1e-13 * np.sin(np.arange(300.0)), 2e-3)

@@ -527,3 +527,27 @@ def test_rates_and_delays_within_rounding_of_whole_numbers_are_those(rate_hz, de
     found = built(rate_hz=rate_hz, delay_s=delay_s, resolution_rad=3e-9)
     assert found == OpticalSensor(1e-6, 1e-3, 3e-9, every, steps)
     assert built().resolution_rad == 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: built(rate_hz=5000.00005), "optical sensor: its sample rate of 5.00000005 kHz is above the control "
+         "rate of 5 kHz: the controller would never read some of its samples; the nearest rate that would do is 5 "
+         "kHz, or raise the control rate (an average of n samples has 1/sqrt(n) of the noise)"),
+        (lambda: built(rate_hz=2500.0005), "optical sensor: its sample rate of 2.5000005 kHz does not divide the "
+         "control rate of 5 kHz (into 2 parts): its samples would fall between those of the controller; the nearest "
+         "rate that would do is 2.5 kHz"),
+        (lambda: built(delay_s=200.00002e-6), "optical sensor: its delay of 200.00002 µs is no whole number of plant "
+         "steps of 20 µs: it would end inside a step; the nearest delay that would do is 200 µs, or choose a plant "
+         "step that divides it"),
+        (lambda: QuadCell(0.9, 0.0, -2.5e-9, 0.0), "quad cell: dark_current_a is -2.5 nA; give a finite number of at "
+         "least 0 (0 A is an ideal cell)"),
+        (lambda: QuadCell(0.9, 0.0, 0.0, -1e-13), "quad cell: thermal_noise_a_sqrt_hz is -0.1 pA/sqrt(Hz); give a "
+         "finite number of at least 0 (0 leaves shot noise alone)"),
+    ],
+)  # fmt: skip
+def test_a_rate_or_a_delay_that_is_hardly_off_is_refused_with_its_digits_and_a_current_with_its_unit(call, words):
+    with pytest.raises(ValueError) as refused:
+        call()
+    assert str(refused.value) == words

@@ -502,3 +502,31 @@ def test_lines_beside_noise_count_by_the_rational_weight(kind):
     shapes = {"MPE": 2 * (s + 6), "RPE": s * (s + math.sqrt(12.0)), "APE": s * s + 6 * s + 12}
     expected = abs(shapes[index.takes] / (s * s + 6 * s + 12)) ** 2
     assert index.rational_weight(11.0)[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ErrorIndex("MKE"), "MKE needs window_s: give the time in s"),
+        (lambda: ErrorIndex("RKE"), "RKE needs window_s: give the time in s"),
+        (lambda: ErrorIndex("PRE"), "PRE needs window_s: give the time in s"),
+        (lambda: ErrorIndex("AKE", 2.0), "AKE has no window_s: leave it out"),
+        (lambda: ErrorIndex("MKE", 2.0, 3.0), "MKE has no spacing_s: leave it out"),
+        (lambda: ErrorIndex("MKE", math.inf), "window_s of MKE is inf s; give a finite number above zero"),
+        (lambda: recorded_rms(MADE, 0.01, ErrorIndex("RKE", 0.014)), "RKE: its times are shorter than two samples of "
+         "0.01 s, or its spacing than one: give longer ones"),
+        (lambda: recorded_rms(MADE, 0.01, ErrorIndex("MKE", 5.0)), "MKE looks at 5 s, and the recording is 4 s long: "
+         "give shorter times or a longer recording"),
+        (lambda: tabulated_rms([0.5, 3.0, 2.0], [1.0, 1.0, 1.0], ErrorIndex("APE"), "two"), "frequencies of the "
+         "density are [0.5, 3.0, 2.0] Hz; give two or more that rise from 0 Hz or above"),
+        (lambda: tabulated_rms([0.5], [1.0], ErrorIndex("APE"), "two"), "frequencies of the density are [0.5] Hz; give "
+         "two or more that rise from 0 Hz or above"),
+        *((lambda bad=bad: tabulated_rms([0.5, 2.0, 3.0], bad, ErrorIndex("APE"), "one"), "a density needs one finite "
+           "value above 0 for each frequency above 0 Hz")
+          for bad in ([1.0, math.inf, 1.0], [1.0, 1.0, math.nan], [1.0, 1.0, 0.0], [1.0, 1.0], [1.0] * 4, [[1.0] * 3])),
+    ],
+)  # fmt: skip
+def test_a_refusal_names_the_index_that_was_asked_for_and_each_value_of_a_density_counts(call, words):
+    with pytest.raises(ValueError) as refused:
+        call()
+    assert str(refused.value) == words

@@ -607,3 +607,38 @@ def test_a_gauge_without_noise_is_a_gauge():
         none.assembled(reads)
     with pytest.raises(ValueError, match="needs one line-of-sight angle for each output of the mirror"):
         replace(LOOP, optics=[[1.0], [1.0]], gauge_noise_rad=0.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [((-0.5, 0.25), None), ((-0.25, math.inf), None), ((0.0, 1.0), "(0.0, 1.0)"), ((-1.0, 0.0), "(-1.0, 0.0)"),
+     ((-2.0, -0.5), "(-2.0, -0.5)"), ((math.nan, 1.0), "(nan, 1.0)"), ((-1.0, math.nan), "(-1.0, nan)")],
+)  # fmt: skip
+def test_a_drive_range_of_less_than_a_volt_is_one_and_rest_at_its_end_is_none(given, shown):
+    if shown is None:
+        found = replace(LOOP, drive_range_v=given).parts.drive
+        assert (found.minimum_v, found.maximum_v) == given
+        return
+    with pytest.raises(ValueError) as refused:
+        replace(LOOP, drive_range_v=given)
+    assert str(refused.value) == f"drive_range_v of a loop is {shown} V: rest, 0 V, has to lie inside"
+
+
+@pytest.mark.parametrize("loop", [LOOP, ON_TWO], ids=["one axis", "two axes"])
+@pytest.mark.parametrize("margin", [0.0, 1.0, -0.5, math.nan])
+def test_a_margin_of_nothing_or_of_all_cannot_be_tuned_for(loop, margin):
+    with pytest.raises(ValueError) as refused:
+        tune(loop, modulus_margin=margin)
+    assert str(refused.value) == f"modulus_margin is {margin}: give a number above 0 and below 1, such as 0.5"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("rate_hz", math.nan), ("rate_hz", -2e3), ("amplifier_bandwidth_hz", 0.0), ("amplifier_bandwidth_hz", math.nan),
+     ("amplifier_bandwidth_hz", -math.inf), ("slew_v_s", math.nan), ("slew_v_s", 0.0)],
+)  # fmt: skip
+def test_a_number_of_a_loop_that_is_not_above_0_is_refused_by_its_name(name, value):
+    with pytest.raises(ValueError) as refused:
+        replace(LOOP, **{name: value})
+    assert str(refused.value) == f"{name} of a loop is {value}: give a number above 0"
+    assert replace(LOOP, amplifier_bandwidth_hz=math.inf, slew_v_s=math.inf).axes == 1
