@@ -107,3 +107,40 @@ def test_a_group_has_its_coordinates_attributes_and_values_picked_from_records()
     assert made.twice.attrs == {"units": "m^2", "long_name": "area"} and made.twice.values.tolist() == [2, 2]
     assert made.grid.dims == ("place", "of") and dict(made.sizes) == {"place": 2, "of": 3}
     assert [*made.coords] == ["place"]
+
+
+SAID = {
+    "trace": {
+        "reference": ("rad", "pointing reference", ("time", "axis")),
+        "disturbance": ("rad", "disturbance before the loop, at the line of sight", ("time", "axis")),
+        "error": ("rad", "pointing error at the line of sight", ("time", "axis")),
+        "measured": ("rad", "reading of the optical sensor", ("time", "axis")),
+        "drive": ("V", "drive behind the amplifier, from the bias", ("time", "actuator")),
+        "mirror": ("rad", "outputs of the mirror", ("time", "output")),
+        "time": ("s", "time", ("time",)),
+        "axis": ("1", "axis of the line of sight", ("axis",)),
+    },
+    "ensemble": {
+        "rms": ("rad", "root mean square of the pointing error, about zero", ("run", "axis")),
+        "mean": ("rad", "mean of the pointing error", ("run", "axis")),
+        "largest": ("rad", "largest radial error", ("run",)),
+        "histogram": ("1", "control samples by their radial error", ("run", "radius")),
+        "counts": ("1", "how often a limit was met, of all actuators or elements", ("run", "limit")),
+        "spectrum": ("rad^2/Hz", "one-sided spectrum of the residual, first batch of runs", ("frequency", "axis")),
+        "axis": ("1", "axis of the line of sight", ("axis",)),
+        "radius": ("rad", "radial error, upper edge of its bin", ("radius",)),
+        "limit": ("1", "limit", ("limit",)),
+        "frequency": ("Hz", "frequency", ("frequency",)),
+    },
+}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_a_loops_arrays_say_what_they_are_and_along_what(name):
+    found = RESULTS[name].to_xarray()
+    said = {key: (of.attrs["units"], of.attrs["long_name"], of.dims) for key, of in found.variables.items()}
+    assert said == SAID[name]
+    if name == "trace":
+        assert dict(found.sizes) == {"time": 100, "axis": 1, "actuator": 1, "output": 1}
+    else:
+        assert found.sizes["run"] == 3 and found.attrs["controller"] == "PID" and found.attrs["run_s"] == 0.1

@@ -323,3 +323,22 @@ def test_each_of_several_plays_has_thresholds_and_weights_of_its_own_number_and_
     assert_allclose(found["adaptive"][:, kernels.LEAST_WEIGHT], [10e-6, 25e-6], rtol=1e-12)
     assert_allclose(found["adaptive"][:, kernels.MOST_WEIGHT], [2.0 * 25e-6, 2.0 * 89e-6], rtol=1e-12)
     assert adaptive.cycle_samples(of, 1e-5) == 320
+
+
+@pytest.mark.parametrize(
+    ("loop", "words"),
+    [
+        (replace(loop_of(), gauge=None), "controller 'own' learns from a strain gauge, and this loop has none: give "
+         "it one "
+         "(fine_pointing.strain_gauge), or take the frozen inverse"),
+        (loop_of(replace(PLAYS, weights_rad_v=(50e-6, -1.1e-6, -1.23456789e-6, 10e-6, 9e-6))), "an adaptive inverse "
+         "keeps "
+         "every play's weight at 0 or above, and one of this mirror is -1.23457e-06 rad/V: identify it with others, or "
+         "take the frozen inverse"),
+    ],
+    ids=["no gauge", "two weights below 0"],
+)  # fmt: skip
+def test_what_cannot_learn_is_told_with_the_controllers_name_and_the_lowest_weight(loop, words):
+    with pytest.raises(ValueError) as refused:
+        fine.with_adaptation(replace(in_series(loop_of()), name="own"), loop)
+    assert str(refused.value) == words

@@ -1064,3 +1064,27 @@ def test_a_mirror_that_its_drives_do_not_move_at_all_is_refused():
         ValueError, match=r"the 3 actuator\(s\) of 'a plate' do not move the line of sight in both axes"
     ):
         scene_of(replace(plain, mirror=replace(plain.mirror, B=0.0 * plain.mirror.B)))
+
+
+@pytest.mark.parametrize("way", ["one way alone", "not at all"])
+def test_a_mirror_that_moves_the_line_of_sight_one_way_alone_is_refused_with_how_much_less_is_too_little(way):
+    plain = three_actuators(0.0)
+    same = np.outer(plain.mirror.B[:, 0], [1.0, 0.5, -0.25])
+    one = replace(plain.mirror, name="a see-saw", B=same if way == "one way alone" else 0.0 * same)
+    with pytest.raises(ValueError) as refused:
+        scene_of(replace(plain, mirror=one))
+    assert str(refused.value) == (
+        "the 3 actuator(s) of 'a see-saw' do not move the line of sight in both axes: one direction moves more than "
+        "10000 times less than the other; check matrices.B and the positions of the outputs"
+    )
+
+
+def test_a_whole_that_is_unstable_has_no_margins(monkeypatch):
+    def unstable(plant, controller):
+        raise ValueError("is unstable")
+
+    monkeypatch.setattr(designs, "whole_margins", unstable)
+    found = designs._margins("plant", "controller")
+    assert found == whole.WholeMargins(0.0, control.MultiloopMargin(0.0, 0.0), 0.0)
+    monkeypatch.setattr(designs, "whole_margins", lambda *given: given)
+    assert designs._margins("plant", "controller") == ("plant", "controller")

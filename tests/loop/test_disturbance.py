@@ -1584,3 +1584,65 @@ def test_of_several_bands_the_one_that_is_farthest_off_either_way_is_named(achie
     assert str(refused.value).startswith(
         f'"rows": no filter of a few terms has these rms values; the nearest has {words}, and 5 % is allowed: '
     )
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: SpectralLine(-1.23456789e-6, 1.0), "amplitude of a spectral line is -1.23457e-06 rad; "),
+        (lambda: SpectralLine(1e-6, -1.23456789), "frequency of a spectral line is -1.23457 Hz; "),
+        (lambda: Misalignment(1.23456789e-6, inf), "a misalignment of 1.23457e-06 rad and inf rad/s; "),
+        (lambda: Misalignment(nan, 1.23456789e-6), "a misalignment of nan rad and 1.23457e-06 rad/s; "),
+        (lambda: replace(FILTER, A=np.diag([-1.0, 1.23456789])), 'shaping filter of "given": a pole has the real part '
+         "1.23457 rad/s, so its motion has no variance; every pole must lie left of the imaginary axis"),
+        (lambda: discretise(replace(FILTER, lines=(SpectralLine(1, 130), SpectralLine(1, 513.123456))), 1e-3 / 1.0001),
+         '"given": a line at 513.123 Hz cannot be sampled every 0.0009999 s, which ends at 500.05 Hz; shorten the '
+         'step'),
+        (lambda: fit_bands((0, 1.23456789, 2.3456789), (1, -1.23456789), convention="radial"), '"bands": rms between '
+         "1.23457 and 2.34568 Hz is -1.23457 rad; "),
+        (lambda: fit_table([1.23456789, 2, 3], [1, 0, 1.23456789], convention="radial"), '"table": the density at 2 '
+         'Hz'),
+        (lambda: fit_table([0, 1.23456789, 2], [1, 1.23456789, 2.0], convention="per-axis"), '"table": 2 rows from '
+         "1.23457 Hz, with a density of 1.23457 rad^2/Hz; give three rows or more of a spectrum, in these units"),
+        (lambda: fit_table([0, 1, 1.0], [1, 1.23456789, 2.3456789], convention="per-axis"), '"table", row 3: (1 Hz, '
+         "2.34568 rad^2/Hz) does not rise in frequency above the row before; sort the rows and remove doubles"),
+    ],
+)  # fmt: skip
+def test_a_refusal_shows_six_digits_of_a_number(call, words):
+    with pytest.raises(ValueError) as refused:
+        call()
+    assert str(refused.value).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("worst_db", "achieved", "words"),
+    [
+        (-3.04, (3.0, 4.0), '"rows": the best filter of a few terms is 3.0 dB below the table near 87.65 Hz, and 3 '
+         'dB is '
+         "allowed; give narrow lines as spectral lines instead, average a rough spectrum over more segments, and end "
+         "the "
+         "table where it falls faster than 1/f^4"),
+        (12.345, (3.0, 4.0), '"rows": the best filter of a few terms is 12.3 dB above the table near 87.65 Hz, and 3 '
+         'dB '
+         "is allowed; give narrow lines as spectral lines instead, average a rough spectrum over more segments, and "
+         "end "
+         "the table where it falls faster than 1/f^4"),
+        (-2.999, (3.0, 4.62), '"rows": the best filter of a few terms has 1.1 times the rms of the table, and 10 % is '
+         "allowed; give the table more finely where it is high"),
+        (2.999, (2.0, 3.0), '"rows": the best filter of a few terms has 0.721 times the rms of the table, and 10 % is '
+         "allowed; give the table more finely where it is high"),
+        (2.999, (3.0, 4.58), None), (-2.999, (2.0, 4.06), None),
+    ],
+)  # fmt: skip
+def test_a_table_is_followed_within_three_decibels_and_a_tenth_of_its_whole_rms(worst_db, achieved, words):
+    """Of 3 and 4 wanted, 5 in all."""
+    fit = SimpleNamespace(
+        worst_db=worst_db, worst_at_hz=87.654321,
+        achieved_rms_rad=np.array(achieved), requested_rms_rad=np.array([3.0, 4.0]),
+    )  # fmt: skip
+    if words is None:
+        assert fits._refuse_poor_table(fit, "rows") is None
+        return
+    with pytest.raises(ValueError) as refused:
+        fits._refuse_poor_table(fit, "rows")
+    assert str(refused.value) == words

@@ -335,3 +335,22 @@ def test_an_inverse_is_refused_with_what_to_take_instead():
     axis = AxisController("I", lti.StateSpace(np.eye(1), np.eye(1, 2), np.eye(1), np.eye(1, 2)), np.eye(1))
     with pytest.raises(ValueError, match="not ahead of it; use with_feedforward, which runs it forward"):
         with_inverse("PI + inverse", found.loop, axis, control.inverse(found.loop.mirror), PATH, False)
+
+
+@pytest.mark.parametrize("name", ["already", "ahead of the linear part"])
+def test_a_refused_feedforward_is_told_with_its_own_name_the_feedbacks_and_the_mirrors(name):
+    loop, feedback = REFUSED[name][0](scene("plays"))
+    loop = replace(loop, mirror=replace(loop.mirror, name="a plate"))
+    with pytest.raises(ValueError) as refused:
+        with_feedforward("ahead", loop, replace(feedback, name="behind"), PATH)
+    assert (
+        str(refused.value)
+        == {
+            "already": "controller 'ahead': 'behind' has an inverse or a feedforward of the reference already, and "
+            "two would "
+            "drive the mirror twice as far; give the feedback alone",
+            "ahead of the linear part": "controller 'ahead': the hysteresis of mirror 'a plate' lies ahead of its "
+            "linear "
+            "part, where it has an inverse; use with_inverse",
+        }[name]
+    )

@@ -728,3 +728,34 @@ def test_a_controller_fits_a_plant_of_its_own_period_but_for_rounding(off, fits)
         return
     with pytest.raises(ValueError, match=r"is made for a period of .* s, the plant is sampled every .*design it again"):
         analysis.refuse_misfit(plant, controller, plant.period_s * (1.0 + off))
+
+
+def test_a_loop_whose_sensitivity_begins_above_1_has_no_bandwidth_and_one_that_never_reaches_it_all_of_the_grid():
+    freq = np.geomspace(1.0, 100.0, 50)
+    for gain, expected in ((-0.5, 0.0), (0.5, 100.0), (-2.5, 100.0)):
+        found = analysis.margins_of(lambda f, gain=gain: gain * (1.0 + 1e-6j) * np.ones(np.shape(f)), freq)
+        assert found.bandwidth_hz == pytest.approx(expected, rel=1e-12)
+    for most, expected in ((4.0, 7.0 * math.sqrt(15.0)), (0.8, 0.0)):  # of |1 + L|, which falls from there on
+        found = analysis.margins_of(lambda f, most=most: most / (1.0 + 1j * np.asarray(f) / 7.0) - 1.0, freq)
+        assert found.bandwidth_hz == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("of", [analysis.margins_of_cuts, analysis.margins_at, analysis.loop_margins])
+def test_each_way_to_margins_refuses_what_does_not_fit_and_what_is_unstable(of):
+    plant = axis_plant()
+    dual = both_sensors(plant)
+    wrong = replace(dual, anti_windup=np.zeros((3, 1)))
+    with pytest.raises(ValueError, match=re.escape("controller 'dual': anti-windup has shape (3, 1), not (2, 1)")):
+        of(plant, wrong)
+    D = plant.system.D.copy()
+    D[GAUGE, 0] = 1e-4
+    with pytest.raises(ValueError) as refused:
+        of(replace(plant, system=replace(plant.system, D=D)), dual)
+    assert str(refused.value) == (
+        "the plant answers the command of its own sample: give it its delay before a loop is closed"
+    )
+    s = dual.system
+    loud = replace(dual, system=replace(s, B=40.0 * s.B, D=40.0 * s.D))
+    with pytest.raises(ValueError, match=r"'dual'.*unstable: a pole at"):
+        of(plant, loud)
+    assert analysis.margins_at(plant, dual).modulus > 0.0

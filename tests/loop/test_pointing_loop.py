@@ -1769,3 +1769,79 @@ def test_records_of_a_run_keep_axes_actuators_and_outputs_apart_where_their_numb
         alone = traces.trace(replace(loop, references=references), controller, span, 4 + k)
         assert_array_equal(errors[k], alone.error_rad)
         assert_array_equal(turned[k], alone.mirror_rad)
+
+
+def test_a_trace_of_four_outputs_three_actuators_and_two_axes_adds_up():
+    """Two gains of the mirror behind unlike optics; the sensor reads the error of the sample before, without noise."""
+    of = mirror.combine(*(resonant_mirror(f, 0.05, g) for f, g in ((400.0, 1e-4), (600.0, 2e-4), (900.0, 3e-4))))
+    over = np.vstack([np.eye(3), [[0.5, -0.25, 0.75]]])
+    of = replace(of, C=over @ of.C, D=over @ of.D, K=over @ of.K)
+    optics = np.array([[1.0, 0.5, 0.25, 0.0], [0.0, 0.5, -0.75, 1.0]])
+    loop = replace(
+        coupled(), mirror=of, optics=optics, optical=OpticalSensor(0.0, inf, 0.0, 1, 10), gauge=None,
+        references=(Reference(7 * URAD, 2 * URAD, 3.0), Reference(-3 * URAD, 0, 1.0)),
+    )  # fmt: skip
+    s = lti.StateSpace(np.eye(2), 20.0 * np.eye(2, 8), np.eye(3, 2), np.zeros((3, 8)))
+    made = LoopController("own", s, np.zeros((2, 3)))
+    found = traces.trace(loop, made, Span(0.1, 0.0, 1), 2)
+    shapes = {key: getattr(found, f"{key}_rad").shape[1] for key in ("reference", "disturbance", "error", "measured")}
+    assert (set(shapes.values()), found.drive_v.shape[1], found.mirror_rad.shape[1]) == ({2}, 3, 4)
+    least = 2.0 ** (1 - lti.EXACT_BITS) * np.max(np.abs(found.mirror_rad))
+    seen = found.mirror_rad @ optics.T
+    assert_allclose(found.error_rad, found.reference_rad + found.disturbance_rad - seen, rtol=0, atol=4 * least)
+    assert_allclose(found.mirror_rad[:, 3], found.mirror_rad[:, :3] @ [0.5, -0.25, 0.75], rtol=0, atol=4 * least)
+    assert_allclose(found.measured_rad[1:], found.error_rad[:-1], rtol=0, atol=1e-15)
+    assert not found.drive_v[:, 2].any() and np.ptp(found.drive_v[:, :2], axis=0).min() > 1e-3
+    assert_allclose(np.ptp(found.reference_rad[:, 1]), 0.0, atol=1e-18)
+    errors, turned = traces.side_by_side(loop, made, Span(0.1, 0.0, 1), [loop.references], 2)
+    assert_array_equal(errors[0], found.error_rad)
+    assert_array_equal(turned[0], found.mirror_rad)
+
+
+@pytest.mark.parametrize(
+    ("span", "words"),
+    [
+        ((0.123456789, 0.3456789), "a run of 0.123457 s has nothing left behind a settling time of 0.345679 s: make "
+         "the "
+         "run longer"),
+        ((0.1, -1.5e-4), "a run of 0.1 s has nothing left behind a settling time of -0.00015 s: make the run longer"),
+        ((0.1, -0.9e-4), None), ((1.1e-4, 0.9e-4), None),
+        ((0.9e-4, 0.0), "a run of 9e-05 s has nothing left behind a settling time of 0 s: make the run longer"),
+        ((-0.5, 0.0), "a run of -0.5 s has nothing left behind a settling time of 0 s: make the run longer"),
+        ((inf, 0.25), "a run of inf s that settles for 0.25 s: give finite seconds"),
+        ((0.123456789, nan), "a run of 0.123457 s that settles for nan s: give finite seconds"),
+    ],
+)  # fmt: skip
+def test_a_run_settles_for_none_of_its_samples_or_for_some_but_not_for_all(span, words):
+    """At 5 kHz, in whole samples."""
+    loop, _ = VARIANTS["one axis"]()
+    if words is None:
+        total, settle = ensemble.control_samples(loop, Span(*span, 1))
+        assert (total, settle) == (round(span[0] / 2e-4), 0)
+        return
+    with pytest.raises(ValueError) as refused:
+        ensemble.control_samples(loop, Span(*span, 1))
+    assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(
+    "A",
+    [[[-1.0, 0.0, 0.0], [0.5, -2.0, 0.0], [0.0, 0.5, -3.0]], [[-1.0, 0.0, 0.5], [0.0, -2.0, 0.0], [0.0, 0.0, -3.0]]],
+)
+def test_states_that_are_no_pairs_are_refused_behind_a_line_and_of_a_second_disturbance(A):
+    dense = Disturbance(
+        "dense", np.array(A), np.ones((3, 1)), np.array([[0.0, 0.0, URAD]]),
+        (disturbance.SpectralLine(URAD, 30.0),), "test", "test",
+    )  # fmt: skip
+    with pytest.raises(ValueError) as refused:
+        kernel_arrays.combined_shaping(scenario(1, disturbances=((disturbance.olympus(), dense),)))
+    assert str(refused.value) == "a disturbance's states do not come in pairs: give its filter in modal form"
+
+
+def test_batches_are_told_as_runs_up_to_their_number():
+    told = []
+    ensemble.simulate(
+        *VARIANTS["one axis"](), Span(2e-3, 0.0, 1), 130, threads=1, on_progress=lambda *each: told.append(each)
+    )
+    name = told[0][2]
+    assert [each for each in told if each[0]] == [(64, 130, name), (128, 130, name), (130, 130, name)]

@@ -527,3 +527,16 @@ def test_a_loop_of_the_kernel_has_the_amplifier_of_each_actuator_and_starts_at_r
     assert {name: getattr(state, name).shape for name in shapes} == shapes
     assert not any(np.any(each) for each in state if isinstance(each, np.ndarray))
     assert np.iinfo(state.counts.dtype).max > 1e15  # of plant steps
+
+
+def test_a_loop_of_three_actuators_and_two_axes_starts_at_rest_with_room_for_both(mission):
+    of = mirror.combine(papers_mirror(PRINTED), papers_mirror(STRAIGHT), papers_mirror(PRINTED))
+    of = replace(of, C=of.C[:2], D=of.D[:2], K=of.K[:2])
+    controller = lti.StateSpace(np.array([[0.5]]), np.ones((1, 2)), np.ones((3, 1)), np.eye(3, 2))
+    setup = simulate.Setup(control.Drive(-3.0, 5.0, 700.0, 250.0, 2e-3, 7e-9), control.Timing(2e-4, 4, 3), controller)
+    loop = simulate.assemble(of, setup, control.no_feedforward(of))
+    state = simulate.at_rest(loop)
+    shapes = {"x": (1,), "error": (2,), "output": (3,), "command": (3,), "target": (3, 2), "pending": (4, 3),
+              "counts": (3, 2), "inverse_clamped": (loop.inverse_bouc_wen.shape[0] + 3,)}  # fmt: skip
+    assert {name: getattr(state, name).shape for name in shapes} == shapes
+    assert (loop.sensor_resolution.shape, loop.actuator.shape, loop.allocation.shape) == ((2,), (3, 5), (3, 2))

@@ -1011,3 +1011,131 @@ def test_a_judge_refuses_plants_that_it_cannot_judge_on(plants, words):
     with pytest.raises(ValueError) as refused:
         judge.Judge(plants)
     assert str(refused.value) == words
+
+
+def whole_search(monkeypatch, roughs, contained, settled_at, holds=lambda t: True):
+    """A tuning whose local searches end at these scores, and what it asks of its parts."""
+    asked, left = {"from": [], "settled": []}, iter(roughs)
+
+    def trial(score, mean, pole=0.5, place=None):
+        where = np.array([score % 1.0 if place is None else place])
+        return SimpleNamespace(score=score, mean_rms_rad=mean, verdict=SimpleNamespace(pole=pole), place=where)
+
+    inner = [trial(9.0 + 0.001 * i, *each) for i, each in enumerate(contained)]
+    surveyed = [trial(n, 0.0, place=0.11 * n) for n in (5.0, 9.0, 3.0, 8.0, 4.0, 7.0)]
+    looked = SimpleNamespace(trials=[1], at_all=lambda places: surveyed)
+    monkeypatch.setattr(tuning, "Search", lambda *given: looked)
+    monkeypatch.setattr(tuning, "_contained", lambda *given: inner)
+    monkeypatch.setattr(tuning, "_places", lambda *given: ())
+    monkeypatch.setattr(tuning, "descend", lambda s, start: asked["from"].append(start.score) or trial(next(left), 0.0))
+    monkeypatch.setattr(
+        tuning, "settled", lambda s, some: asked["settled"].extend(t.score for t in some) or trial(0.0, settled_at)
+    )
+    monkeypatch.setattr(tuning, "_tuned", lambda s, t: t)
+    monkeypatch.setattr(tuning, "_holds", lambda s, t: holds(t))
+    monkeypatch.setattr(tuning, "_variances", lambda s, t: (None, [t.mean_rms_rad**2]))
+    asked["found"] = tuning.tune(SimpleNamespace(name="f"), "pq", HALF, seed=1, survey=6)
+    return asked
+
+
+def test_local_searches_set_out_from_the_best_of_both_halves_in_turn_and_the_near_optima_are_followed(monkeypatch):
+    """Halves of 3, 4, 5 and 7, 8, 9 behind what is contained; of the ends those within 1e-4 of the least, and apart."""
+    roughs = (2.5, 2.00009, 2.9, 2.03, 2.7, 2.00001, 2.8)
+    asked = whole_search(monkeypatch, roughs, [(7.0,)], 4.0)
+    assert asked["from"] == [9.0, 3.0, 7.0, 4.0, 8.0, 5.0, 9.0]
+    assert asked["settled"] == [2.00001]  # 2.00009 lies at the same place, the next ones are dearer
+    again = whole_search(monkeypatch, (2.3, 2.30002, 2.30009, 9.9, 9.9, 9.9), [], 4.0)
+    assert (again["from"], again["settled"]) == ([3.0, 7.0, 4.0, 8.0, 5.0, 9.0], [2.3])
+    agreed = whole_search(monkeypatch, (2.3, 2.300001, 2.300002, 9.9), [], 4.0)
+    assert agreed["from"] == [3.0, 7.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("contained", "dead", "mean"),
+    [
+        ([(3.0,), (2.0,)], (), 2.0), ([(2.0,), (3.0,)], (), 2.0), ([(5.0,)], (), 4.0), ([], (), 4.0),
+        ([(3.0, 1.0), (3.5,)], (), 3.5),  # unstable
+        ([(3.0,), (3.5,)], (3.0,), 3.5), ([(3.0,)], (3.0,), 4.0), ([(4.0,)], (), 4.0),
+    ],
+)  # fmt: skip
+def test_of_what_a_family_contains_the_best_that_holds_is_taken_where_it_leaves_less(
+    monkeypatch, contained, dead, mean
+):
+    ends = [2.0 + 0.1 * i for i in range(8)]
+    found = whole_search(monkeypatch, ends, contained, 4.0, lambda t: t.mean_rms_rad not in dead)["found"]
+    assert (found.mean_rms_rad, found.verdict.pole) == (mean, 0.5)
+
+
+def test_of_optima_that_are_as_good_the_one_of_the_smaller_values_is_rounded_and_kept_at_its_place(monkeypatch):
+    asked = []
+
+    def optimum(score, *values):
+        return SimpleNamespace(score=score, values=values, place=f"place of {values[0]:g}")
+
+    optima = [optimum(1.0000004, 7.00049, 1.0), optimum(1.0, 5.00049, 3.0), optimum(0.9999998, 5.00049, 2.00019),
+              optimum(1.1, 1.0, 1.0)]  # fmt: skip
+    looked = SimpleNamespace(of=lambda values, place: asked.append((values.tolist(), place)) or "found")
+    monkeypatch.setattr(tuning, "settle", lambda s, t, models: asked.append(models) or t)
+    monkeypatch.setattr(tuning, "_holds", lambda s, found: True)
+    assert tuning.settled(looked, optima, 3) == "found"
+    assert asked == [3, 3, 3, 3, ([5.0, 2.0], "place of 5.00049")]
+    asked.clear()
+    assert tuning.settled(looked, optima[::-1]) == "found"
+    assert asked == [25, 25, 25, 25, ([5.0, 2.0], "place of 5.00049")]
+
+
+def test_a_margin_that_stays_overstated_is_sought_four_times_each_from_where_the_last_ended(monkeypatch):
+    begun, looked = [], SimpleNamespace(optimism=1.0)
+    looked.of = lambda values, place: SimpleNamespace(n=len(begun))
+    looked.at = lambda place: SimpleNamespace(score=2.0, values=(1.0,), place=f"judged {place}")
+    monkeypatch.setattr(tuning, "settle", lambda s, t, models: begun.append(t.place) or SimpleNamespace(
+        score=1.0, values=(1.0,), place=f"{len(begun)}"))  # fmt: skip
+    monkeypatch.setattr(tuning, "_holds", lambda s, found: False)
+    monkeypatch.setattr(tuning, "_overstated", lambda s, found: 1.0 + 0.5 * (found.n == 2))
+    monkeypatch.setattr(tuning, "_refusal", lambda s: "out of reach" if s is looked else "")
+    with pytest.raises(ValueError, match=r"^out of reach$"):
+        tuning.settled(looked, [SimpleNamespace(place="first")])
+    assert begun == ["first", "judged 1", "judged 2", "judged 3"]
+    assert looked.optimism == near(1.5 * 1.001**3)
+
+
+@pytest.mark.parametrize(
+    ("ends", "models", "steps", "place"),
+    [
+        # each end: score behind the step of the model, or None for a place without a model
+        ((3.0, 2.0, 1.0), 3, [(0.1, 3e-3)] * 3, 0.53),
+        ((3.0, 2.0, 1.0), 2, [(0.1, 3e-3)] * 2, 0.52),
+        ((3.0, 5.0, 2.0, 2.0 + 5e-10, 2.5, 1.0), 6,
+         [(0.1, 3e-3)] * 2 + [(0.025, 1.5e-3)] * 3 + [(0.00625, 7.5e-4)], 0.54),
+        ((3.0, None, 1.0), 9, [(0.1, 3e-3)] * 2, 0.51),
+        ((3.0, "still", 1.0), 9, [(0.1, 3e-3)] * 2, 0.51 + 9e-9),
+        ((9.0,) * 20, 20, [(0.1 * 0.25**k, 3e-3 * 0.5**k) for k in range(6)], 0.5),
+    ],
+)  # fmt: skip
+def test_models_reach_less_far_where_one_has_misled_and_end_where_a_step_stands_still(
+    monkeypatch, ends, models, steps, place
+):
+    """Each step goes 0.01 on, from a trial of score 4; one that stands still 9e-9, of whatever score."""
+    asked, left = [], iter(ends)
+    now = [None]
+
+    def model(search, here, node):
+        now[0] = next(left)
+        asked.append(node)
+        return None if now[0] is None else "a model"
+
+    def optimum(model, where, reach):
+        asked[-1] = (near(reach), near(asked[-1]))
+        return np.array([9e-9 if now[0] == "still" else 0.01])
+
+    def at(where):
+        return SimpleNamespace(place=where, score=99.0 if now[0] == "still" else now[0])
+
+    monkeypatch.setattr(descent, "_model", model)
+    monkeypatch.setattr(descent, "_optimum", optimum)
+    start = SimpleNamespace(place=np.array([0.5]), score=4.0)
+    found = descent.settle(SimpleNamespace(at=at), start, models)
+    assert found.place.tolist() == [pytest.approx(place, abs=2e-9)]
+    assert len(asked) == len(steps)
+    for took, step in zip(asked, steps, strict=True):
+        assert (took if isinstance(took, tuple) else (near(step[0]), near(took))) == step
