@@ -607,3 +607,36 @@ def test_a_line_that_no_peak_can_take_out_is_named_wherever_it_stands(lines, wor
     with pytest.raises(ValueError) as refused:
         family.build(PLAIN, np.array([216.0, 731.0, 50.0, 1e-3]))
     assert str(refused.value).startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("family", "expected", "more"),
+    [
+        (RESONANT_DAMPING, {
+            "integral frequency": ("Hz", 0.01, 250.0, True, None), "filter frequency": ("Hz", 20.0, 490.0, True, None),
+            "filter damping": ("", 0.05, 2.0, True, 2.0), "position feedback": ("", -0.9, 0.9, False, 0.0),
+        }, None),
+        (DISTURBANCE_OBSERVER, {
+            "Q bandwidth": ("Hz", 0.1, 450.0, True, None), "lead": ("Hz", None, 1e4, True, 1e4),
+            "Q damping": ("", 0.3, 4.0, True, 4.0),
+        }, None),
+        (peak_family((40, 31.104, 7.5)), {
+            "integral frequency": ("Hz", 0.01, 250.0, True, None), "zero": ("Hz", None, 1e4, True, 1e4),
+            "peak gain": ("", 0.1, 300.0, True, None), "peak damping": ("", 1e-4, 2e-2, True, None),
+        }, [0.1, 1e-4]),
+    ],
+    ids=["resonant damping", "disturbance observer", "PI + peaks"],
+)  # fmt: skip
+def test_a_family_beside_the_pi_has_its_parameters_in_their_order_with_bounds_and_gentle_ends(family, expected, more):
+    """At a control period of 1 ms; the least zero is a tenth of the plant's corner."""
+    plant = axis_plant(amplifier_hz=300.0, period_s=1e-3)
+    told = {p.name: (p.unit, p.least, p.most, p.log, p.gentle) for p in family.parameters(plant)}
+    assert [*told] == [*expected]
+    for name, (unit, least, most, log, gentle) in expected.items():
+        least = 0.1 * classical.corner_hz(plant) if least is None else least
+        assert told[name] == (unit, pytest.approx(least), pytest.approx(most), log, gentle and pytest.approx(gentle))
+    assert (family.base and family.base.name, family.final) == (None if more is None else "PI", None)
+    if more is not None:
+        assert family.extended(plant, np.array([30.0, 500.0])).tolist() == pytest.approx([30.0, 500.0, *more])
+        made = family.build(plant, np.array([30.0, 500.0, 50.0, 1e-3]))
+        assert (made.name, made.system.order) == ("PI + peaks", 1 + 2 * 3)

@@ -1845,3 +1845,20 @@ def test_batches_are_told_as_runs_up_to_their_number():
     )
     name = told[0][2]
     assert [each for each in told if each[0]] == [(64, 130, name), (128, 130, name), (130, 130, name)]
+
+
+def test_a_slow_state_keeps_its_time_constant_beside_a_line_that_is_turned_exactly():
+    """A corner at 1 uHz, of which a step of 50 us takes 3e-10, behind a line of 0.7 Hz and a faster pair."""
+    slow = disturbance.first_order(1e-12, 1e-6, convention="per-axis", name="slow")
+    line = disturbance.wheels(0.7, (1.0,), (1e-9,), convention="per-axis")
+    pair = Disturbance("pair", np.array([[-3.0, 40.0], [-40.0, -3.0]]), np.ones((2, 1)), np.ones((1, 2)), (), "", "")
+    found = kernel_arrays.combined_shaping(unlike(disturbances=((slow,), (line, disturbance.combine(pair, slow)))))
+    lost, turn = 1.0 - found.diagonal, 2 * pi * 0.7 * 5e-5
+    for at in (0, 6):
+        assert lost[at] == pytest.approx(2 * pi * 1e-6 * 5e-5, rel=1e-3)
+    assert_array_equal(found.diagonal[2:4], [np.cos(turn)] * 2)
+    assert_array_equal(found.coupling[2:4], [np.sin(turn), -np.sin(turn)])
+    assert_allclose(found.diagonal[4:6], exp(-3.0 * 5e-5) * np.cos(2e-3), rtol=1e-9)
+    assert_allclose(found.coupling[4:6], exp(-3.0 * 5e-5) * np.sin(2e-3) * np.array([1.0, -1.0]), rtol=1e-8)
+    assert_array_equal(found.coupling[4:6], lti.to_bits(found.coupling[4:6], lti.EXACT_BITS))
+    assert not found.coupling[[0, 1, 6, 7]].any()

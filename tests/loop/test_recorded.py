@@ -874,3 +874,24 @@ def test_a_recording_lasts_from_its_first_sample_to_its_last_and_its_drift_is_no
     assert below.mean_rad == pytest.approx(-5.0 - 1e-9 * np.mean(MOVING), rel=1e-12)
     with pytest.raises(ValueError, match=r'"recording" stands still at -5 rad'):
         recorded_motion(-5.0 - 1e-13 * np.sin(np.arange(300.0)), 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("size", "edges"),
+    [
+        (101, [1, 49, 101]), (97, [1, 49, 97]), (96, [1, 96]), (98, [1, 49, 98]), (40, [1, 40]),
+        (192, [1, 49, 97, 192]), (193, [1, 49, 97, 145, 193]), (194, [1, 49, 97, 145, 194]),
+        (600, [1, 49, 97, 145, 193, 241, 289, 337, 385, 433, 481, 529, 600]),
+        (640, [1, 49, 97, 145, 193, 241, 289, 337, 385, 433, 481, 529, 581, 640]),
+    ],
+)  # fmt: skip
+def test_the_floor_goes_by_medians_of_bands_of_48_bins_or_a_tenth_and_the_last_one_takes_what_is_left(size, edges):
+    moved = np.cumsum(np.random.default_rng(size).standard_normal(2 * size - 2))
+    window = np.linspace(0.5, 1.5, moved.size)
+    power, floor = recorded_lines._power_and_floor(moved, window)
+    assert_allclose(power, np.abs(np.fft.rfft(window * moved)) ** 2, rtol=1e-9)
+    middle, level = [], []
+    for first, behind in zip(edges, edges[1:], strict=False):
+        middle.append((first + behind - 1) / 2)
+        level.append(math.log(np.median(power[first:behind]) / math.log(2.0)))
+    assert_allclose(np.log(floor), np.interp(np.arange(size), middle, level), rtol=1e-9)
