@@ -633,8 +633,8 @@ def test_a_family_beside_the_pi_has_its_parameters_in_their_order_with_bounds_an
     told = {p.name: (p.unit, p.least, p.most, p.log, p.gentle) for p in family.parameters(plant)}
     assert [*told] == [*expected]
     for name, (unit, least, most, log, gentle) in expected.items():
-        least = 0.1 * classical.corner_hz(plant) if least is None else least
-        assert told[name] == (unit, pytest.approx(least), pytest.approx(most), log, gentle and pytest.approx(gentle))
+        lowest = 0.1 * classical.corner_hz(plant) if least is None else least
+        assert told[name] == (unit, pytest.approx(lowest), pytest.approx(most), log, gentle and pytest.approx(gentle))
     assert (family.base and family.base.name, family.final) == (None if more is None else "PI", None)
     if more is not None:
         assert family.extended(plant, np.array([30.0, 500.0])).tolist() == pytest.approx([30.0, 500.0, *more])

@@ -1186,3 +1186,22 @@ def test_a_sensor_said_to_have_no_noise_has_none_whatever_light_there_is(file):
     quiet = f.model_copy(update={"optical_sensor": f.optical_sensor.model_copy(update={"noise_rad": 0.0})})
     for light in (None, 5e-9):
         assert scenario.optical_sensor(quiet, light, 1.55e-6, 0.1).noise_rad == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [("PI", []), ("LQG", []), (designs.WITH_INVERSE, [False]), (designs.IN_SERIES, [True]),
+     (designs.ADAPTIVE, [True, "learns"])],
+)  # fmt: skip
+def test_an_inverse_stands_in_series_where_the_name_says_so_and_learns_where_it_does(monkeypatch, name, asked):
+    told = []
+    here = SimpleNamespace(loop=SimpleNamespace(mirror="mirror"), table=SimpleNamespace(reference_filter_hz=70.0))
+    monkeypatch.setattr(designs, "assemble", lambda *given: given)
+    monkeypatch.setattr(designs, "ReferenceFilter", lambda corner_hz: corner_hz)
+    monkeypatch.setattr(control, "inverse", lambda mirror: f"inverse of {mirror}")
+    monkeypatch.setattr(designs, "with_inverse", lambda *given: told.append(given[-1]) or given[:-1])
+    monkeypatch.setattr(designs, "with_adaptation", lambda made, loop: told.append("learns") or (*made, loop))
+    made = designs.build(name, here, "axis")
+    inverse = ("inverse of mirror", 70.0) if asked else ()
+    assert made == (name, here.loop, "axis", *inverse, *([here.loop] if "learns" in asked else []))
+    assert told == asked

@@ -1646,3 +1646,19 @@ def test_a_table_is_followed_within_three_decibels_and_a_tenth_of_its_whole_rms(
     with pytest.raises(ValueError) as refused:
         fits._refuse_poor_table(fit, "rows")
     assert str(refused.value) == words
+
+
+@pytest.mark.parametrize("step_s", [1e-4, 0.3, 7.0])
+def test_an_input_that_drives_nothing_takes_no_random_numbers(step_s):
+    """Three inputs of two apart states, of which the second drives none and the third one that is not seen."""
+    A, B = np.diag([-2.0, -5.0]), np.array([[2e-6, 0.0, 0.0], [0.0, 0.0, 7e-6]])
+    given = Disturbance("d", A, B, np.array([[1.0, 0.0]]), (SpectralLine(3e-6, 0.05),), "", "")
+    found = discretise(given, step_s)
+    assert (found.Bd.shape, found.Ad.shape) == ((4, 1), (4, 4))
+    assert found.Bd[2, 0] ** 2 == pytest.approx(1e-12 * -np.expm1(-4.0 * step_s), rel=1e-6)
+    assert found.Bd[[0, 1, 3], 0] == pytest.approx([0.0] * 3, abs=1e-20)
+    assert given.variance_rad2 == pytest.approx(1e-12 + 0.5 * 9e-12, rel=1e-9)
+    for inputs in (B[:, 1:2], B[:, :0]):
+        still = replace(given, B=inputs, lines=())
+        assert (still.variance_rad2, discretise(still, step_s).Bd.shape) == (0.0, (2, 0))
+        assert not psd(still, np.array([0.1, 1.0])).any()

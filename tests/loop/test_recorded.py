@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -891,7 +892,7 @@ def test_the_floor_goes_by_medians_of_bands_of_48_bins_or_a_tenth_and_the_last_o
     power, floor = recorded_lines._power_and_floor(moved, window)
     assert_allclose(power, np.abs(np.fft.rfft(window * moved)) ** 2, rtol=1e-9)
     middle, level = [], []
-    for first, behind in zip(edges, edges[1:], strict=False):
+    for first, behind in pairwise(edges):
         middle.append((first + behind - 1) / 2)
         level.append(math.log(np.median(power[first:behind]) / math.log(2.0)))
     assert_allclose(np.log(floor), np.interp(np.arange(size), middle, level), rtol=1e-9)
