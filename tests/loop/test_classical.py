@@ -640,3 +640,35 @@ def test_a_family_beside_the_pi_has_its_parameters_in_their_order_with_bounds_an
         assert family.extended(plant, np.array([30.0, 500.0])).tolist() == pytest.approx([30.0, 500.0, *more])
         made = family.build(plant, np.array([30.0, 500.0, 50.0, 1e-3]))
         assert (made.name, made.system.order) == ("PI + peaks", 1 + 2 * 3)
+
+
+@pytest.mark.parametrize("pole", [1.0, -1.0, 1.01, -3.0])
+def test_a_model_that_would_drift_away_is_refused_whichever_way_its_pole_lies(pole):
+    s = PLAIN.system
+    A = s.A.copy()
+    A[0, 0] = pole
+    for ask in (DISTURBANCE_OBSERVER.parameters, lambda plant: DISTURBANCE_OBSERVER.build(plant, np.ones(3))):
+        with pytest.raises(ValueError) as refused:
+            ask(replace(PLAIN, system=replace(s, A=A)))
+        assert str(refused.value) == (
+            f"a disturbance observer runs a model of the plant, which has a pole at |z| = {abs(pole):.6f} (the limit "
+            "is "
+            "1) and would drift away from it; use a PI or LQG controller for this plant"
+        )
+    A[0, 0] = 0.999 * pole / abs(pole)
+    assert len(DISTURBANCE_OBSERVER.parameters(replace(PLAIN, system=replace(s, A=A)))) == 3
+
+
+@pytest.mark.parametrize(("damping", "order"), [(0.02, 4), (0.1, 4), (0.3, 2), (0.7, 2)])
+def test_an_observer_undoes_a_resonance_that_stands_out_and_leaves_one_that_hardly_does(damping, order):
+    """One of damping 0.3 is a resonance yet, but not twice as high as what lies beside it."""
+    plant = axis_plant(resonance=(900.0, damping))
+    assert bool(classical.resonances(plant)) == (damping < 0.5)
+    found = classical.observer_filter(plant, 400.0, 800.0, 1.0)
+    assert found.order == order
+    slow = respond(found, 0.001)[0, 0, 0] * respond(plant.from_command, 0.001)[0, 0, 0]
+    assert abs(slow) == pytest.approx(1.0, rel=1e-3)
+    ratio = (
+        respond(found, 900.0)[0, 0, 0] / respond(classical.observer_filter(PLAIN, 400.0, 800.0, 1.0), 900.0)[0, 0, 0]
+    )
+    assert abs(ratio) < 2.5 * damping if order == 4 else abs(ratio) == pytest.approx(1.0, rel=1e-6)

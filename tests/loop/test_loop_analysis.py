@@ -759,3 +759,10 @@ def test_each_way_to_margins_refuses_what_does_not_fit_and_what_is_unstable(of):
     with pytest.raises(ValueError, match=r"'dual'.*unstable: a pole at"):
         of(plant, loud)
     assert analysis.margins_at(plant, dual).modulus > 0.0
+
+
+def test_a_loop_is_real_at_half_the_rate_and_nowhere_below():
+    L = np.array([[1.0 + 2.0j, -3.0 + 4.0j, 5.0 - 6.0j, 7.0 + 8.0j]])
+    cycles = np.array([0.1, 0.5 - 1e-8, 0.5 * (1.0 - 1e-10), 0.5])
+    found = analysis.real_at_half_the_rate(L, cycles)
+    assert found.tolist() == [[1.0 + 2.0j, -3.0 + 4.0j, 5.0, 7.0]]

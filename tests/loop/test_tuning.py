@@ -1139,3 +1139,21 @@ def test_models_reach_less_far_where_one_has_misled_and_end_where_a_step_stands_
     assert len(asked) == len(steps)
     for took, step in zip(asked, steps, strict=True):
         assert (took if isinstance(took, tuple) else (near(step[0]), near(took))) == step
+
+
+@pytest.mark.parametrize("pole", [1.0, -1.0, -1.25, 1.5])
+def test_a_plant_that_is_not_stationary_is_refused_whichever_way_its_pole_lies_and_wherever_the_plant_stands(pole):
+    n = PLAIN.system.order
+    poles = np.linspace(0.2, 0.7, n)
+    poles[1] = pole
+    loud = replace(PLAIN, system=replace(PLAIN.system, A=np.diag(poles)))
+    for plants in ((PLAIN, loud), (loud, PLAIN), (loud,)):
+        with pytest.raises(ValueError) as refused:
+            judge.Judge(plants)
+        assert str(refused.value) == (
+            f"a plant has a pole at |z| = {abs(pole):.9f} (the limit is 1): it or its disturbance is not stationary; "
+            "give "
+            "the disturbance some damping"
+        )
+    poles[1] = 0.999 * pole / abs(pole)
+    assert judge.Judge([replace(PLAIN, system=replace(PLAIN.system, A=np.diag(poles)))]).open_rad2 > 0.0
