@@ -485,3 +485,11 @@ def test_a_mirror_of_several_axes_has_no_sampled_plant_and_is_told_with_both_its
     with pytest.raises(ValueError) as refused:
         control.sampled_plant(three, IDEAL_DRIVE, Timing(PERIOD, 1, 0))
     assert str(refused.value) == "mirror 'tripod' has 3 actuators and 2 axes: give one axis at a time"
+
+
+def test_a_loop_without_states_has_no_pole_and_a_slow_one_its_largest():
+    none = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[0.5]]))
+    assert control.slowest_pole(none) == 0.0
+    A, B = np.diag([0.5, -0.9]), np.array([[1.0], [0.0]])
+    assert control.slowest_pole(lti.StateSpace(A, B, np.array([[0.25, 0.0]]), np.zeros((1, 1)))) == pytest.approx(0.9)
+    assert control.slowest_pole(lti.StateSpace(A, B, np.array([[-0.75, 0.0]]), np.zeros((1, 1)))) == pytest.approx(1.25)

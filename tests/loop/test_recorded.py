@@ -896,3 +896,38 @@ def test_the_floor_goes_by_medians_of_bands_of_48_bins_or_a_tenth_and_the_last_o
         middle.append((first + behind - 1) / 2)
         level.append(math.log(np.median(power[first:behind]) / math.log(2.0)))
     assert_allclose(np.log(floor), np.interp(np.arange(size), middle, level), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("fitted", "drift", "reason"),
+    [
+        (0.6, 0.33, "drift, and what settles slowly behind the begin, are no part of the fit"),
+        (0.6, 0.31, "another: -0.64"), (1.0, 9.0, ""), (2.0, 9.0, "another: 3"), (2.0, 0.0, "another: 3"),
+    ],
+)  # fmt: skip
+def test_drift_is_the_reason_where_it_makes_more_than_half_of_what_is_left_beyond_the_fit(
+    monkeypatch, fitted, drift, reason
+):
+    """A played residual of 1 rms, of which half of the excess over 0.6^2 is 0.32."""
+    sign = np.where(np.arange(7981) % 2, 1.0, -1.0)
+    asked = []
+    given = iter([sign, math.sqrt(drift) * sign])
+    theory = SimpleNamespace(error_by_source={KNOWN.name: [fitted**2], "sensor": [0.09], "gauge": [0.16]})
+    monkeypatch.setattr(played, "close", lambda loop, controller: loop.disturbances)
+    monkeypatch.setattr(played, "refuse_unstable", asked.append)
+    monkeypatch.setattr(played, "edge_s", lambda motion, step_s: 0.0)
+    monkeypatch.setattr(played, "resampled", lambda motion, step_s: np.zeros(7981))
+    monkeypatch.setattr(played, "play", lambda closed, moved: next(given))
+    monkeypatch.setattr(played, "stationary", lambda closed: asked.append(closed) or theory)
+    monkeypatch.setattr(played, "_simulated", lambda loop, controller, moved, span: span)
+    monkeypatch.setattr(played, "_reason", lambda fit, known, moved, error, step, missing: f"another: {missing:g}")
+    fit = SimpleNamespace(motion=recorded_motion(MOVING, 1e-3, "tracker"), disturbance=KNOWN, correlation_s=0.01)
+    found = recorded_residual(LOOP.parts, TRACKING, fit, 0.05)
+    assert found.reason == reason
+    assert (found.played.rms_rad, found.fitted_rms_rad) == (pytest.approx(1.0), pytest.approx(fitted))
+    assert found.difference == pytest.approx(1.0 / fitted - 1.0)
+    assert (found.played.begin_s, found.played.end_s) == (pytest.approx(0.05), pytest.approx(0.399))
+    span = found.simulated_rms_rad
+    assert (span.duration_s, span.settle_s, span.seed) == (pytest.approx(0.399), pytest.approx(0.05), 0)
+    assert found.beyond_loop_rad == 0.0
+    assert asked == [((),), ((KNOWN,),)]
