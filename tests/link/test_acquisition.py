@@ -795,3 +795,19 @@ def test_each_time_of_an_acquisition_has_its_own_place_in_the_sequence():
     )  # fmt: skip
     alike = partner_search._timing(SimpleNamespace(called=lambda role: "A"), SimpleNamespace(**times), 4e7)
     assert (alike.own_name, alike.partner_name) == ("A (own)", "A (partner)")
+
+
+def test_a_way_that_ends_in_lock_as_seldom_as_any_is_told_of_is_possible():
+    def possible(probability):
+        return replace(FOUND, outcome=SimpleNamespace(success_probability=probability)).possible
+
+    assert possible(partner_search.RAREST)
+    assert not possible(math.nextafter(partner_search.RAREST, 0.0))
+
+
+def test_a_stage_that_never_ends_has_no_longest_time():
+    never = merged(np.array([3.0]), np.array([0.0]))
+    stage = replace(CHAIN[0], duration_s=never)
+    assert (never.time_s.size, stage.longest_s) == (0, 0.0)
+    ends = replace(CHAIN[0], duration_s=merged(np.array([0.7, 0.3]), np.array([0.25, 0.5])))
+    assert ends.longest_s == 0.7

@@ -237,3 +237,11 @@ def test_the_light_between_two_alike_is_split_between_their_axes(axes):
     sent = np.exp(-2.0 * ((np.sqrt(np.sum(both[:, :axes] ** 2, axis=1)) + 3e-6) / 70e-6) ** 2)
     across = both[:, 3] if axes == 2 else 0.0
     assert_allclose(found, sent * bent.share(both[:, axes], across) / bent.share(0.0), rtol=1e-12)
+
+
+def test_power_that_just_has_the_margin_is_not_below_it():
+    """Words of five samples at full power, one of them with a sample that is not; the margin is of all the power."""
+    error = np.zeros((15, 2, 3))
+    error[7, 1] = 20e-6
+    found = in_slices(code_words._Lost(FadeMargin(Light(63e-6, 0.0), 0.0), 5), error, 8)
+    assert_allclose(found, [[1 / 3] * 3, [1 / 15] * 3], rtol=1e-12)

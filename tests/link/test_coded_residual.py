@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from link_files import link_file
+from link_files import link_file, received_with
 from microrad import link
 from microrad.core.intervals import student
 from microrad.link.coupling import Pupil, SingleModeFibre
@@ -163,3 +163,17 @@ def test_a_window_is_as_many_samples_as_are_nearest_to_the_span(span_s, length):
     beam = CodedBeam(Light(100e-6, 0.0), 2.75, CODE, 1e-5, "convolutional", span_s)
     (counted,) = coded_asked(beam, LOOP.parts, SPAN).tallies()
     assert {each.length for each in counted._windows} == {length}
+
+
+@pytest.mark.parametrize(("given", "receiver", "target"), [
+    ({"bit_error_ratio": 3e-7}, {}, 3e-7),
+    ({}, received_with("homodyne bpsk", bit_error_ratio=2e-5, code_gain="0 dB", code_rate=0.5), 2e-5),
+])  # fmt: skip
+def test_the_target_of_a_coded_beam_is_that_of_its_receiver_or_without_one_that_of_its_fading(
+    tmp_path, given, receiver, target
+):
+    table = {"code": "ccsds-k7-1-2", "interleaving": "block", "interleaver": "5 ms", **given}
+    alone = dict.fromkeys(("beacon", "answer", "acquisition"))
+    file = link_file(tmp_path, alone, receiver, {"communication.fading": table})
+    found = CodedBeam.of(link.of(file.mission))
+    assert (found.target, found.interleaving, found.span_s) == (target, "block", pytest.approx(5e-3))

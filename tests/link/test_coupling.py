@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.special import j0, j1
+from scipy.special import j0, j1, jv
 
 from microrad.link import beams, coupling
 from microrad.link.coupling import Aberrations, BothEnds, Disk, Losses, Pupil, SingleModeFibre, losses
+from microrad.link.coupling import pupil as pupils
 from microrad.link.pointing import MovingEnd, fades, fades_of_both
 from microrad.link.radial_error import Jitter, radial_steps
 
@@ -551,3 +552,12 @@ def test_a_refusal_of_an_end_is_one_whole_sentence(found, expected):
     with pytest.raises((ValueError, ArithmeticError)) as refused:
         found()
     assert str(refused.value) == expected
+
+
+@pytest.mark.parametrize("numbers", [[0], [1], [5], [0, 1, 2], [0, 2, 3, 7]])
+def test_bessel_functions_of_rising_orders_are_those_of_each_order_near_and_far(numbers):
+    x = np.array([[0.0, 0.3, 2.9, 3.1], [7.4, 10.4, 10.6, 180.0]])
+    found = list(pupils._bessel(np.array(numbers, dtype=np.float64), x))
+    assert len(found) == len(numbers)
+    for number, each in zip(numbers, found, strict=True):
+        np.testing.assert_allclose(each, jv(number, x), rtol=0, atol=1e-13)

@@ -851,3 +851,12 @@ def test_a_part_of_a_series_is_on_its_scale_and_keeps_what_is_said_of_it():
     assert (some.period_s, some.source, some.normalised, some.sha256) == (2e-3, "a.csv", "largest", "abc")
     assert some.power.tolist() == pytest.approx([k / 400.0 for k in range(101, 301)])
     assert some.duration_s == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("margin_db", "lost"), [(1e-3, 0.0), (0.5, 0.0), (-0.05, 1.0), (-3.0, 1.0)])
+def test_words_are_lost_as_soon_as_their_error_ratio_is_above_the_target(margin_db, lost):
+    """At constant power, where 0.05 dB less makes the errors hardly more."""
+    found = coded_fading(linked(series_of(np.full(400, 3.0)), 20), margin_db, 1e-6)
+    assert (found.lost.value, found.words) == (lost, 20)
+    low, high = {1e-3: (0.9, 1.0), 0.5: (0.0, 0.5), -0.05: (1.1, 1.9), -3.0: (1e3, 1e6)}[margin_db]
+    assert low < found.ratio.value / 1e-6 < high

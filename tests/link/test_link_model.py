@@ -18,9 +18,10 @@ from microrad import link
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 from microrad.link import beams, gains, receivers
 from microrad.link import study as link_study
-from microrad.link.budget import lines
+from microrad.link.budget import lines, maps
 from microrad.link.budget.lines import LEFT_AT_ZERO
 from microrad.mission.tables.coupling import Coupling
+from microrad.mission.tables.link import half_angle_rad
 
 WAVELENGTH, RATE = 1.55e-6, 300e6
 PHOTON_J = PLANCK_J_S * SPEED_OF_LIGHT_M_S / WAVELENGTH
@@ -718,3 +719,38 @@ def test_lines_of_other_conventions_say_what_they_are_and_where_they_hold(read, 
         line = found[name]
         source = line.source.partition(",")[0]
         assert f"{line.value:.3f}: {line.basis} | {source} | {line.regime} | {line.warning}" == said
+
+
+def test_the_rate_at_a_loss_is_told_down_to_the_slowest_and_no_further(read):
+    """With a measured sensitivity the rate falls in proportion to the power."""
+    data = link.of(read({}).mission)
+    slowest = maps.SLOWEST_BIT_S
+    spare = maps.received_on_axis_dbm(data) - float(link.required_dbm(data, slowest))
+    for left in (0.0, 0.4, 3.0):
+        rate = link.rate_at_loss(data, 2.0, spare - 2.0 - left - 1e-9 * (left == 0.0))
+        assert rate == pytest.approx(slowest * 10.0 ** (0.1 * left), rel=1e-6)
+    with pytest.raises(link.LinkError) as refused:
+        link.rate_at_loss(data, 2.0, spare - 2.0 + 0.25)
+    assert str(refused.value).endswith("leaves a margin of 2 dB: 0.25 dB are missing")
+
+
+@pytest.mark.parametrize("name", ["beacon", "answer"])
+def test_an_uncorrected_point_ahead_is_a_line_of_a_gaussian_beam_beyond_its_own_error(read, name):
+    """exp(-2 (error / theta)^2) with the error, and with both angles in one line."""
+    beam = {f"{name}.divergence": "60 urad", f"{name}.pointing_error": "11 urad"}
+    ahead = {"point_ahead.corrected": False, "point_ahead.transverse_velocity": "3000 m/s"}
+    angle, per_square = 2.0 * 3000.0 / SPEED_OF_LIGHT_M_S, 20.0 / math.log(10.0)
+    file = read(beam, ahead)
+    half = half_angle_rad(60e-6, file.mission.conventions.divergence)
+    budget = link.beam_budget(name, link.Shared.of(file.mission), getattr(file.mission, name), file.sources)
+    found = {line.name: line for line in budget.lines}
+    own, both = (per_square * (error / half) ** 2 for error in (11e-6, 11e-6 + angle))
+    assert found["Pointing loss"].value == pytest.approx(-own, rel=1e-12)
+    line = found["Point-ahead loss"]
+    assert line.value == pytest.approx(own - both, rel=1e-12)
+    assert (line.basis, line.regime) == (
+        "not corrected: 2 v / c = 20.01 µrad",
+        "added to the pointing error in its worst direction",
+    )
+    source = [part.partition(",")[0] for part in line.source.split("; ")]
+    assert (source, line.warning) == (["mission file"] * 2, "")

@@ -351,3 +351,60 @@ def test_where_no_value_leaves_the_margin_the_file_keeps_its_own_with_the_larger
     solution = link_study.solve_key(file, f"jitter.{key}")
     assert (solution.solved.intervals, solution.value, solution.unit) == ((), largest, "rad")
     assert solution.file == file
+
+
+@pytest.mark.parametrize("given", [{"possible": lambda x: x < 30.0}, {"below": 5.0}, {"above": -2.0}])
+def test_a_margin_that_is_the_same_wherever_there_is_one_does_not_move(given):
+    with pytest.raises(ValueError, match=r"^a\.key moves this margin by nothing$"):
+        solve(lambda _: 4.5, **given)
+
+
+def axes_of(*values):
+    """An input of several items, whose tables are the numbers by their places."""
+    rule = SimpleNamespace(out_of_bounds=lambda number: "")
+
+    def moving(place):
+        return lambda tables, number: (*tables[:place], number, *tables[place + 1 :])
+
+    return tuple(
+        SimpleNamespace(key="a.key", shown=f"a.key.{place + 1}", value=value, rule=rule, moved=moving(place))
+        for place, value in enumerate(values)
+    )
+
+
+@pytest.mark.parametrize(("values", "said"), [
+    ((0.0, 0.0), "a.key is 0, which no factor moves: give it a value to begin with"),
+    ((2.0, -3.0), "a.key moves this margin by nothing"),
+    ((0.0,), "a.key.1 is 0, which no factor moves: give it a value to begin with"),
+    ((2.0,), "a.key.1 moves this margin by nothing"),
+])  # fmt: skip
+def test_an_input_of_two_axes_is_refused_by_its_key_and_one_axis_with_its_place(values, said):
+    with pytest.raises(ValueError) as refused:
+        variation.solve(values, axes_of(*values), "m", lambda tables: 1.0, 0.0, lambda tables: True)
+    assert str(refused.value) == said
+
+
+@pytest.mark.parametrize(("values", "best"), [((2.0, -3.0), -12.0), ((-3.0, 2.0), -12.0), ((4.0, 1.0), 4.0)])
+def test_axes_are_moved_in_proportion_to_the_one_that_is_larger_in_size(values, best):
+    """The margin is left where the sizes of both together are from 5 to 20: of 3 and 2 parts, or of 4 and 1."""
+
+    def margin_db(tables):
+        assert tables[0] * values[1] == pytest.approx(tables[1] * values[0])
+        size = sum(abs(each) for each in tables)
+        return min(size - 5.0, 20.0 - size)
+
+    found = variation.solve(values, axes_of(*values), "m", margin_db, 0.0, lambda tables: True)
+    (kept,) = found.intervals
+    share = abs(best) / best * max(abs(each) for each in values) / sum(abs(each) for each in values)
+    assert sorted((kept.low, kept.high)) == pytest.approx(sorted((5.0 * share, 20.0 * share)))
+    assert (kept.low_open, kept.high_open) == (False, False)
+
+
+@pytest.mark.parametrize(("end", "possible", "expected"), [
+    (9.0, lambda x: x < 2.5, 2.0),  # 9, 5 and 3 are too far
+    (-7.0, lambda x: x > -2.0, -1.0),  # -7 and -3 are
+    (9.0, lambda x: True, 9.0),
+    (1.0, lambda x: False, 1.0),
+])  # fmt: skip
+def test_the_step_of_a_swing_is_halved_until_there_is_such_a_mission(end, possible, expected):
+    assert variation._nearest(1.0, numbered(1.0), end, possible) == expected

@@ -647,3 +647,14 @@ def test_neither_the_side_of_a_bias_nor_the_order_of_the_axes_counts(rms_urad):
     for x, y in ((1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
         np.testing.assert_allclose(found(x, y), wanted, rtol=1e-9, atol=1e-300)
         np.testing.assert_allclose(found(x, y, 1), wanted, rtol=1e-9, atol=1e-300)
+
+
+@pytest.mark.parametrize(("margin_db", "rms_urad", "speed", "lasting_s"), [
+    (4000.0, (2.0, 0.3), 1e-4, 0.0),  # no error comes so far
+    (1.0, (4.0, 4.0), 0.0, math.inf),  # nothing moves
+])  # fmt: skip
+def test_fades_of_both_ends_that_never_begin_last_for_ever_or_are_not_there(margin_db, rms_urad, speed, lasting_s):
+    ends = [pf.MovingEnd(Jitter((1e-7, 0.0), (rms * URAD, rms * URAD)), (speed, speed), 9.0 * URAD) for rms in rms_urad]
+    found = pf.fades_of_both(*ends, margin_db)
+    assert (float(found.per_second), float(found.mean_duration_s)) == (0.0, lasting_s)
+    assert float(found.share_of_time) > 0.9 if lasting_s else float(found.share_of_time) == 0.0
