@@ -561,3 +561,24 @@ def test_bessel_functions_of_rising_orders_are_those_of_each_order_near_and_far(
     assert len(found) == len(numbers)
     for number, each in zip(numbers, found, strict=True):
         np.testing.assert_allclose(each, jv(number, x), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize(("aberrations", "shift", "offset_rad", "is_round"), [
+    (Aberrations(), 0.0, 0.0, True),
+    (Aberrations(defocus_m=5e-8, spherical_m=-3e-8), 0.0, 0.0, True),
+    (Aberrations(coma_m=9e-8), 0.0, 0.0, False),
+    (Aberrations(defocus_m=9e-8, astigmatism_m=9e-8), 0.0, 0.0, False),
+    (Aberrations(), 0.8, 0.0, False),
+    (Aberrations(), 0.0, 1.5e-6, False),
+])  # fmt: skip
+def test_the_worst_direction_and_the_mean_over_directions_are_those_of_an_end_of_any_one_asymmetry(
+    aberrations, shift, offset_rad, is_round
+):
+    end = SingleModeFibre(replace(BEST, aberrations=aberrations, shift=shift), offset_rad)
+    angle = 2.0 * math.pi * np.arange(360) / 360
+    lost = end.loss_db(4.0 * URAD * np.cos(angle), 4.0 * URAD * np.sin(angle))
+    assert end.is_round is is_round
+    assert np.ptp(lost) < 1e-9 if is_round else np.ptp(lost) > 0.1
+    assert end.worst_loss_db(4.0 * URAD) == pytest.approx(np.max(lost), abs=0.02)
+    mean_db = float(np.mean(lost) - end.loss_db(0.0))
+    assert end.error_rad(mean_db) == pytest.approx(4.0 * URAD, rel=1e-3)

@@ -860,3 +860,15 @@ def test_words_are_lost_as_soon_as_their_error_ratio_is_above_the_target(margin_
     assert (found.lost.value, found.words) == (lost, 20)
     low, high = {1e-3: (0.9, 1.0), 0.5: (0.0, 0.5), -0.05: (1.1, 1.9), -3.0: (1e3, 1e6)}[margin_db]
     assert low < found.ratio.value / 1e-6 < high
+
+
+@pytest.mark.parametrize("margin_db", [2.0, -1.5])
+def test_where_no_power_makes_up_for_the_fades_they_are_those_below_what_the_code_needs_at_the_power_there_is(
+    margin_db,
+):
+    power = np.ones(1024)
+    power[100:140], power[300:330] = 0.0, 10.0**-0.05  # darkness, and 0.5 dB less
+    found = coded_fading(linked(series_of(power, normalised="as-given")), margin_db, 1e-6)
+    assert (found.penalty_db, found.margin_left_db) == (math.inf, -math.inf)
+    assert found.fades.level == pytest.approx(10.0 ** (-0.1 * margin_db), rel=1e-12)
+    assert found.fades.share == pytest.approx(40 / 1024 if margin_db > 0.5 else 1.0)

@@ -459,3 +459,18 @@ def test_readings_and_ideal_receivers_count_what_the_receiver_and_the_point_ahea
             at = m.communication.pointing_error_rad if error_rad is None else error_rad
             margin = float(link.margin_map(link.of(with_it), 250e6, at)[0, 0])
             assert each.margin_db == pytest.approx(margin, abs=1e-9)
+
+
+@pytest.mark.parametrize("table", [FIBRE, MULTI, DETECTOR], ids=["fibre", "multi-mode", "detector"])
+def test_the_exposure_of_a_link_without_jitter_has_the_static_loss_of_its_receiver(tmp_path, table):
+    lines, budget = lines_of(with_coupling(tmp_path, table | {"pointing_error": "6 urad"}, AHEAD))
+    data = link.of(with_coupling(tmp_path, table | {"pointing_error": "6 urad"}, AHEAD).mission)
+    found = Exposure.stated(data)
+    lost = -lines["Receive pointing loss"].value
+    assert lost > 0.01 or table is MULTI
+    assert (found.received_db, found.received_mean_db) == pytest.approx((lost, lost), abs=1e-9)
+    sent = -(lines["Pointing loss"].value + lines["Point-ahead loss"].value)
+    assert found.outage_loss_db == pytest.approx(sent + lost, abs=1e-9)
+    assert found.margin_db == pytest.approx(budget.margin_db, abs=1e-9)
+    assert found.short_of(budget.margin_db - 0.01) == 0.0
+    assert found.short_of(budget.margin_db + 0.01) == 1.0
