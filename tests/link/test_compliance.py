@@ -14,6 +14,7 @@ from microrad.link import compliance
 from microrad.link import study as link_study
 from microrad.link.acquisition.trade import Beams
 from microrad.link.compliance import judge
+from microrad.link.compliance.standards import _asked
 from preset_files import completed
 
 BARE = dict.fromkeys(("beacon", "answer", "acquisition", "point_ahead"))
@@ -574,3 +575,26 @@ def test_a_mission_that_scans_has_the_edge_of_its_beam_and_its_scan_named(studie
     edge = f"edge of the scan's beam, from 44000 km to 5500 km {MOVED}"
     assert row(by_scan, "acquisition_irradiance").why == edge
     assert row(by_scan, "acquisition_time").why.endswith(f" of all searches by {found.finding.scan.name} end in lock")
+
+
+@pytest.mark.parametrize(("more", "expected"), [
+    ({}, ("", "", None, (), (), "", None, None, "")),
+    (
+        {"number": "REQ-7", "numbered_in": "4.0", "comparison": "between", "values": ["1530 nm", "1.565 um"],
+         "unit": "m", "distance": "1000 km", "bit_error_ratio": 1e-6, "outside": "no clocks"},
+        ("REQ-7", "4.0", "between", (1530e-9, 1565e-9), ("1530 nm", "1.565 um"), "m", 1e6, 1e-6, "no clocks"),
+    ),
+    (
+        {"comparison": "one of", "values": ["1/2", "ook", "3/4"]},
+        ("", "", "one of", (0.5, 0.75), ("1/2", "ook", "3/4"), "", None, None, ""),
+    ),
+    ({"distance": "0 m", "bit_error_ratio": 0.0}, ("", "", None, (), (), "", 0.0, 0.0, "")),
+])  # fmt: skip
+def test_an_entry_of_a_standard_is_read_with_each_of_its_keys_and_without_those_it_has_not(more, expected):
+    entry = {"key": "wavelength", "subject": "beam", "asks": "the band", "source": "second", **more}
+    found = _asked(entry, {"first": "a report", "second": "a page"})
+    assert (found.key, found.subject, found.asks, found.source) == ("wavelength", "beam", "the band", "a page")
+    own = (found.number, found.numbered_in, found.comparison, found.values, found.texts, found.unit, found.distance_m)
+    found_all = (*own, found.bit_error_ratio, found.outside)
+    assert found_all[:3] + found_all[4:] == expected[:3] + expected[4:]
+    assert found.values == pytest.approx(expected[3], rel=1e-12)

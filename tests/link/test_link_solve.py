@@ -408,3 +408,12 @@ def test_axes_are_moved_in_proportion_to_the_one_that_is_larger_in_size(values, 
 ])  # fmt: skip
 def test_the_step_of_a_swing_is_halved_until_there_is_such_a_mission(end, possible, expected):
     assert variation._nearest(1.0, numbered(1.0), end, possible) == expected
+
+
+@pytest.mark.parametrize(("key", "hint"), [
+    ("x" * 57 + ".power", "there are beacon.power, answer.gain"),  # what is cut off is no name, so that none is alike
+    ("x" * 54 + ".power", "did you mean beacon.power?"),
+])  # fmt: skip
+def test_a_key_that_is_too_long_to_be_told_is_looked_for_as_far_as_it_is_told(key, hint):
+    said = link_study._no_such_key(key, ["beacon.power", "answer.gain"])
+    assert said == f'no table of the links has a quantity "{key[:60]}"; {hint}'

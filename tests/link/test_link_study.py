@@ -1281,3 +1281,21 @@ def test_a_scan_for_a_direction_without_error_is_refused_in_one_whole_sentence()
         "pointing.lines: every error is 0 rad, and a scan has nothing to cover; give an error above 0 rad, or take out "
         "acquisition.scan"
     )
+
+
+def test_the_best_radius_of_a_beam_is_none_of_those_that_the_obscuration_stops(tmp_path):
+    """A narrow beam lies wholly within an obscuration of six tenths of the aperture: the widest that pass are tried."""
+
+    def lit(radius_m):
+        beam = {"profile": "gaussian", "radius": f"{radius_m * 1e3:.9f} mm", "m_squared": 1.0}
+        changes = {"communication.beam": beam, "terminals.leo_obscuration": 0.6}
+        return link.of(link_file(tmp_path, PATTERN, changes).mission)
+
+    data = lit(30e-3)
+    aperture_m = data.shared.terminals.leo_aperture_m
+    with pytest.raises(ValueError, match=r"obscuration"):
+        lit(0.1 * aperture_m / 2.0)
+    best = link_study.beam_radius(data)
+    assert 0.3 * aperture_m < best.best_m < 0.75 * aperture_m
+    gained_db = margin_db(lit(best.best_m)) - margin_db(data)
+    assert best.gained_db == pytest.approx(gained_db, abs=1e-6) and best.gained_db >= 0.0
