@@ -588,6 +588,10 @@ def test_a_mission_that_scans_has_the_edge_of_its_beam_and_its_scan_named(studie
         {"comparison": "one of", "values": ["1/2", "ook", "3/4"]},
         ("", "", "one of", (0.5, 0.75), ("1/2", "ook", "3/4"), "", None, None, ""),
     ),
+    (
+        {"comparison": "between", "values": ["-90 deg", "+180 deg"], "unit": "rad"},
+        ("", "", "between", (-math.pi / 2.0, math.pi), ("-90 deg", "+180 deg"), "rad", None, None, ""),
+    ),
     ({"distance": "0 m", "bit_error_ratio": 0.0}, ("", "", None, (), (), "", 0.0, 0.0, "")),
 ])  # fmt: skip
 def test_an_entry_of_a_standard_is_read_with_each_of_its_keys_and_without_those_it_has_not(more, expected):

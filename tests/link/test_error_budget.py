@@ -1520,3 +1520,19 @@ def test_a_source_that_nothing_is_known_of_is_refused_in_one_whole_sentence(made
     with pytest.raises(ValueError) as refused:
         made()
     assert str(refused.value) == said
+
+
+@pytest.mark.parametrize(("call", "said"), [
+    (lambda: Requirement(ErrorIndex("PRE", 1.0, 2.5), observation_s=10.0 / 3.0),
+     "PRE: its windows lie in two observation periods of 3.33333 s; space them wider"),
+    (lambda: Requirement(ErrorIndex("PDE", 1.0, 2.5), observation_s=10.0 / 3.0),
+     "PDE: both windows have to lie in the observation period of 3.33333 s; give it longer"),
+    (lambda: Requirement(ErrorIndex("APE"), limit_rad=-1e-6 / 3.0),
+     "a limit of -3.33333e-07 rad; give a finite one above zero"),
+    (lambda: Requirement(ErrorIndex("APE"), confidence=4.0 / 3.0),
+     "a confidence of 1.33333: give a share above 0 and below 1"),
+])  # fmt: skip
+def test_a_refusal_of_a_requirement_has_six_digits_of_a_number_that_has_more(call, said):
+    with pytest.raises(ValueError) as refused:
+        call()
+    assert str(refused.value) == said

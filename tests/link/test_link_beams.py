@@ -537,3 +537,14 @@ def test_a_beam_that_the_aperture_hardly_cuts_falls_as_a_gaussian_far_below_its_
     expected = GaussianFall(shape.half_angle_rad).error_rad(loss)
     assert shape.error_rad(loss) == pytest.approx(expected, rel=1e-4)
     assert float(shape.loss_db(shape.error_rad(loss))) == pytest.approx(loss, abs=0.01)
+
+
+@pytest.mark.parametrize("obscuration", [2.0 / 3.0, 0.71234567])
+def test_a_refusal_of_a_beam_that_is_stopped_has_six_digits_of_an_obscuration_that_has_more(obscuration):
+    with pytest.raises(ValueError) as refused:
+        LitAperture(0.21, 9.3e-7, 5.0, obscuration)
+    most = 1.0 / narrowest_radius(obscuration)
+    assert str(refused.value) == (
+        f"truncation is 5: it must be finite, at most {most:.6g}; an obscuration of "
+        f"{'0.666667' if obscuration < 0.7 else '0.712346'} stops the rest of the beam"
+    )

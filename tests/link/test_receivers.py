@@ -1201,3 +1201,13 @@ def test_the_data_rate_that_is_told_as_the_most_is_taken():
     with pytest.raises(RateError, match=said):
         narrow.required_power_w(1.235e9)
     assert np.isfinite(narrow.required_power_w(1.234e9))
+
+
+@pytest.mark.parametrize(("ratio", "shown"), [(3e-7, "3e-07"), (1e-7 / 3.0, "3.33333e-08")])
+def test_a_refusal_of_a_phase_error_has_six_digits_of_numbers_that_have_more(ratio, shown):
+    with pytest.raises(ValueError) as refused:
+        replace(KINDS_UNLIKE["qpsk heterodyne"], phase_error_rad=1.0 / 3.0, bit_error_ratio=ratio)
+    said = str(refused.value)
+    start = f"QpskHeterodyne.phase_error_rad is 0.333333 rad: no power reaches a bit error ratio of {shown} above "
+    assert said.startswith(start) and said.endswith(" rad rms")
+    assert 0.05 < float(said.removeprefix(start).split()[0]) < 0.2
