@@ -15,7 +15,7 @@ from microrad.link import ground
 from microrad.link import study as link_study
 from microrad.link.ground import ground_link
 from microrad.link.pointing import outage
-from microrad.link.turbulence import HufnagelValley
+from microrad.link.turbulence import Downlink, HufnagelValley
 from microrad.link.variation import beam_tornado, divergence_possible
 
 deg = math.pi / 180.0
@@ -755,3 +755,24 @@ def test_a_correction_that_leaves_more_than_a_radian_is_doubted_where_it_counts(
     found = [each for each in link.of(m).turbulent.doubts if "Marechal" in each]
     assert found == ([f"a residual of {math.sqrt(left):.2g} rad rms, above 1: Marechal's ends"] if doubted else [])
     assert (left > 1.0) is (modes < 100)
+
+
+def test_a_beam_down_to_the_station_that_sends_the_data_fades_as_over_its_own_aperture(tmp_path):
+    """The satellite, whose aperture is another one, answers."""
+    m = ground_file(tmp_path, RISING).mission
+    shared, half_rad = link.Shared.of(m), m.answer.divergence_rad
+    found = shared.turbulent(m.answer, "geo", half_rad, None)
+    down, tilt = Downlink(found.path), m.channel.turbulence.tilt
+    assert (m.path.station, found.direction) == ("leo", "downlink")
+    assert found.index == pytest.approx(down.index(0.12), rel=1e-12)
+    assert found.arrival_rad == pytest.approx(down.arrival_rms_rad(0.12, tilt), rel=1e-12)
+    assert abs(down.index(0.08) / found.index - 1.0) > 0.1
+
+
+@pytest.mark.parametrize("changes", [(RISING,), ({"communication.coupling": FIBRE},)], ids=["up", "down"])
+def test_the_air_of_a_link_is_the_clear_sky_with_what_a_wider_beam_or_a_bent_wavefront_costs(tmp_path, changes):
+    file = ground_file(tmp_path, *changes)
+    found = lines_of(link.communication_budget(link.of(file.mission), file.sources))
+    names = {"Clear-sky loss", "Turbulence spread loss", "Turbulence coupling loss"} & found.keys()
+    assert len(names) == 2 and all(found[name] < -0.01 for name in names)
+    assert link.of(file.mission).air_db == pytest.approx(-sum(found[name] for name in names), rel=1e-9)
