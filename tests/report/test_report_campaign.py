@@ -44,7 +44,7 @@ from microrad.report.campaign.page import campaign_figures, campaign_page
 from microrad.report.campaign.tables import failed_table
 from microrad.report.campaign.text import campaign_text
 from microrad.report.plotting.palette import BLACK, WHITE
-from microrad.report.plotting.sheet import Axis, Field, Line, Panel, Rule, Span
+from microrad.report.plotting.sheet import Area, Axis, Field, Line, Panel, Rule, Span
 from microrad.report.view import Points
 from report_pages import assert_sound, without_scripts
 
@@ -3169,3 +3169,75 @@ def test_the_tails_of_all_other_combinations_stand_in_grey_behind_that_of_the_on
     ]
     assert figure.columns["probability"].tolist() == pytest.approx([0.7, 0.07, 0.007, 0.0])
     assert figure.caption.startswith("Probability that the radial error of mirror = 2.toml exceeds a radius.")
+
+
+@pytest.mark.parametrize(
+    ("survival", "wanted", "low"),
+    [
+        ([0.5, 0.3, 0.0], (), 10.0**-1.3),  # at least a decade is shown
+        ([0.5, 0.02, 0.0], (0.05,), 10.0**-2.3),
+        ([0.5, 0.02, 0.0], (0.05, 3e-5, 1e-3), 10.0**-5.3),
+        ([0.5, 2e-14, 0.0], (), 10.0**-14.3),
+        ([0.5, 1e-14, 3e-40], (1e-3,), 1e-15),
+        ([0.5, 1e-3, 0.0], (1e-30,), 1e-15),
+    ],
+)
+def test_the_axis_of_a_tail_ends_a_decade_below_the_least_probability_and_at_1e_15(survival, wanted, low):
+    tail = short_tail(survival=np.array(survival), wanted=dict.fromkeys(wanted, NO_INTERVAL))
+    assert drawing._floor(tail) == pytest.approx(low, rel=1e-9)
+
+
+def test_the_band_of_a_tail_ends_at_1_and_the_name_of_its_combination_has_lines_of_24_letters():
+    tail = short_tail(high=np.array([1.25, 0.5, 0.25, 0.125]), low=np.array([0.5, 0.0625, 0.0, 0.0]))
+    cell = a_cell({"mirror": "coupled.toml", "aperture": "25 cm"}, tail=tail)
+    (figure,) = drawing.tail(a_campaign([cell]), cell)
+    (band,) = [mark for mark in marks(figure) if isinstance(mark, Area)]
+    assert [point.tolist() for point in band.rings[0]] == [
+        pytest.approx(point) for point in ([1, 0.5], [2, 0.0625], [3, 1e-300], [3, 0.25], [2, 0.5], [1, 1.0])
+    ]
+    assert [mark.label for mark in marks(figure) if getattr(mark, "dash", "") == "-"] == [
+        "mirror = coupled.toml,\naperture = 25 cm"
+    ]
+    exact = replace(cell, values={"a": "22222", "b": "four", "c": "x"})
+    (figure,) = drawing.tail(a_campaign([exact]), exact)
+    assert [mark.label for mark in marks(figure) if getattr(mark, "dash", "") == "-"] == ["a = 22222, b = four, c =\nx"]
+
+
+def test_a_map_has_names_of_12_letters_across_and_of_24_downwards_and_its_titles_on_the_outside():
+    across = ["twelve--abcd", "thirteen-abcd"]
+    down = ["twenty-four-------abcdef", "twenty-five-------abcdefg", "z"]
+    keys = ("fine_pointing.body.of_the_first_satellite", "communication.divergence_of_the_beam")
+    cells = [a_cell({keys[0]: a, keys[1]: b}) for b in down for a in across]
+    (figure,) = drawing.grid(a_campaign(cells, failed=()))
+    first, *others = figure.sheet.panels
+    assert first.x.title == "body.of_the_first_satellite"
+    assert first.y.title == "communication.\ndivergence_of_the_beam"
+    assert [panel.y.title for panel in others] == [""] * len(others) and others
+    for panel in (first, *others):
+        assert list(panel.x.ticks.values()) == ["twelve--abcd", "thirteen-ab…"]
+        assert list(panel.y.ticks.values()) == ["twenty-four-------abcdef", "twenty-five-------abcde…", "z"]
+
+
+def test_the_limit_of_a_share_is_marked_in_per_cent():
+    output = an_output("outage", "", 0.0625)
+    found = limit_marks(marks(drawing.distribution(output, Limit("outage", 0.125, 0.25, "a"))))
+    assert found == ([pytest.approx(12.5), pytest.approx(25.0)], [])
+    labels = [mark.label for mark in marks(drawing.distribution(output, Limit("outage", 0.125, 0.25, "a")))]
+    assert [label for label in labels if label.startswith("limit")] == ["limit ≥ 12.5 %", "limit ≤ 25 %"]
+    far = limit_marks(marks(drawing.distribution(output, Limit("outage", None, 1e-4, "a"))))
+    assert far == ([pytest.approx(0.01)], [])
+
+
+def test_rows_and_reasons_of_failed_rows_are_folded_where_a_terminal_is_narrow():
+    """The combination of the first column and the reason in the last one; seeds and tries stay as they are."""
+    reason = "the sensor was not calibrated in the night before the run, and its offset is beyond what the loop takes"
+    cell = a_cell({"mirror": "coupled.toml", "aperture": "25 cm", "case": "a long name of it"}, failed=1)
+    text = campaign_text(
+        a_campaign([a_cell({"mirror": "b"}), cell], failed=((1, Failed(7, 987654321, 12, reason)),)), 60
+    )
+    lines = text[text.index("Failed rows") :].splitlines()
+    end = next(k for k, line in enumerate(lines) if line.startswith("Warning"))
+    assert max(map(len, lines[:end])) <= 60
+    table = " ".join(" ".join(lines[:end]).split())
+    assert "987654321" in table and " 12 " in table
+    assert all(f" {word} " in f" {table} " for word in (*reason.split(), "coupled.toml,", "25"))

@@ -2661,3 +2661,28 @@ def test_arrays_of_the_loops_budget_and_sines_have_unlike_numbers_of_each_kind()
         "quantile": [2.0, 3.0, 4.0, 5.0],
     }
     assert of.variables["quantile"].long_name == "radial error that 0.95 of the time stays below"
+
+
+def test_what_contradicts_linear_theory_is_told_of_each_controller_with_its_own_numbers():
+    """Of three controllers the second is as in theory on a straight mirror, and the last was not simulated on one."""
+    every = (
+        verified("PI", 2e-6, 4e-6, **{"no hysteresis": (3e-6, 1e-6)}),
+        verified("LQG", 1.25e-6, 3e-6, **{"no hysteresis": (1.25e-6, 1e-6)}),
+        verified("PID", 5e-6, 7e-6),
+        verified("H-inf", 4e-6, 6e-6, **{"no hysteresis": (2e-6, 1e-6)}),
+    )
+    fine = loops_of(1.5e-6, *every)
+    fine.budget = ns(linear=False, controller="PID", combined_rad=2.5e-6, full_rad=6.25e-6)
+    act = "in theory: its limits or quantisation act"
+    assert words._theory_warnings(fine) == [
+        (
+            ["PID"],
+            "the error budget of PID is not linear: its parts combine to 2.50 µrad, the whole is 6.25 µrad rms",
+        ),
+        (["PI"], f"PI leaves 3.00 µrad rms without hysteresis, 2.00 µrad {act}"),
+        (["H-inf"], f"H-inf leaves 2.00 µrad rms without hysteresis, 4.00 µrad {act}"),
+        (["LQG"], "the linear bound of 1.50 µrad rms lies above the 1.25 µrad of LQG, so it is none"),
+    ]
+    fine = loops_of(1e-6, every[1])
+    fine.budget = ns(linear=True)
+    assert words._theory_warnings(fine) == []

@@ -2263,3 +2263,45 @@ def test_the_legend_of_a_panel_has_the_panels_title_where_there_are_others(colum
     panels[0].title, panels[0].legend = "A title", Legend("above", title="kind")
     (key,) = turned(sheet)["keys"]
     assert key["title"] == title
+
+
+def test_panels_that_share_an_axis_pass_over_those_that_have_no_title():
+    sheet, (first, second, _) = grid(4.0, 4.0, 3, 1, share_x=True)
+    first.x.title, second.x.title = "first (s)", "second (s)"
+    assert [placed.x_title for placed in layout(sheet).placed] == ["first (s)", "second (s)", "second (s)"]
+    sheet, (_, middle, right) = grid(6.0, 2.0, 1, 3, share_y=True)
+    middle.y.title, right.y.title = "second (m)", "last (m)"
+    assert [placed.y_title for placed in layout(sheet).placed] == ["second (m)", "second (m)", "last (m)"]
+
+
+@pytest.mark.parametrize(
+    ("place", "of", "gaps"),
+    [
+        ("above", "outer", (None, 0.0, None, None)),
+        ("below", "outer", (None, None, None, 0.0)),
+        ("upper left", "inner", (6.0, 3.0, None, None)),
+        ("upper right", "inner", (None, 3.0, 6.0, None)),
+        ("lower left", "inner", (6.0, None, None, 3.0)),
+        ("lower right", "inner", (None, None, 6.0, 3.0)),
+    ],
+)
+def test_the_legend_of_a_panel_stands_at_its_edge_or_in_its_corner(place, of, gaps):
+    """Gaps at the left, above, at the right and below, in points; at an edge it is in the middle of the data."""
+    sheet = one(Line(X, Y, label="a"), Line(X, Y, VERMILION, label="b"), x={"title": "time (s)"}, y={"title": "y"})
+    sheet.panels[0].legend, sheet.panels[0].title = Legend(place, 2), "title"
+    (key,), (placed,) = layout(sheet).keys, layout(sheet).placed
+    left, top, right, bottom = getattr(placed, of)
+    found = (key.x - left, key.y - top, right - key.x - key.width, bottom - key.y - key.height)
+    for gap, wanted in zip(found, gaps, strict=True):
+        assert wanted is None or gap == pytest.approx(wanted)
+    if of == "outer":
+        assert key.x + key.width / 2.0 == pytest.approx((placed.inner[0] + placed.inner[2]) / 2.0)
+
+
+@pytest.mark.parametrize("upright", [True, False])
+def test_bars_of_which_an_end_a_place_or_a_breadth_is_not_known_are_not_drawn(upright):
+    at, start, end, breadth = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]] * 4) * [[1.0], [0.0], [1.0], [0.1]]
+    start[1] = end[2] = at[3] = breadth[4] = math.nan
+    sheet = one(Bars(at, start, end, breadth, VERMILION, upright=upright), x={"high": 9.0}, y={"high": 9.0})
+    (path,) = [each.get("d") for each in parts(sheet, "path") if each.get("fill") == VERMILION]
+    assert "nan" not in svg_of(sheet) and path.count("M") == path.count("Z") == 2

@@ -3875,3 +3875,28 @@ def test_the_papers_loop_is_held_over_the_last_of_three_periods(tmp_path, monkey
     with pytest.raises(AskedError):
         list(loop_checks._papers_loop(workspace.Workspace(tmp_path, None)))
     assert asked == [((0.0, 3 / 25.0), 2 / 25.0, pytest.approx(3 / 25.0, rel=1e-12))]
+
+
+def test_what_is_not_as_at_the_release_is_told_of_all_checks_and_recordings_together():
+    def outcome(name, absent):
+        return SimpleNamespace(check=SimpleNamespace(name=name), absent=absent)
+
+    v = SimpleNamespace(
+        integrity=SimpleNamespace(whole=False, text="One file was changed."),
+        outcomes=[outcome("c1", "not here"), outcome("c2", ""), outcome("c3", "nor there")],
+        other_recordings=["b.csv", "a.csv"],
+    )
+    assert [(each.letter, each.found) for each in warned._setup(v)] == [
+        ("f", "One file was changed."),
+        ("f", "Recordings are not at hand for c1, c3."),
+        ("f", "Not the recordings of the release: b.csv, a.csv."),
+    ]
+    assert len({each.impact for each in warned._setup(v)}) == 3
+    whole = SimpleNamespace(integrity=SimpleNamespace(whole=True), outcomes=[v.outcomes[1]], other_recordings=[])
+    assert list(warned._setup(whole)) == []
+
+
+@pytest.mark.parametrize(("measured", "published"), [(1, 1), (2, 2), (1, 2), (3, 1)])
+def test_the_concept_is_validated_by_as_many_measurements_as_published_outputs(measured, published):
+    found = credibility.factors(dict.fromkeys(Status, 1), True, True, measured, published)
+    assert [f.level for f in found if f.name == "Validation"] == [1]
