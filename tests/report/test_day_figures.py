@@ -1159,3 +1159,12 @@ def test_of_many_bends_the_last_is_drawn_although_it_is_not_one_of_every_so_many
     latency_s, share = figures._distribution(SimpleNamespace(latency=given))
     assert (latency_s[-1], share[-1]) == (100.0, 1.0)
     assert share[-2] == pytest.approx(899.0 / 998.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("largest", "log"), [(40.0, False), (60.0, True)])
+def test_windows_without_an_error_or_of_none_do_not_count_in_the_median_that_tells_the_axis(largest, log):
+    """The median of what is known and above 0 is 1; with the zeros it would be 0."""
+    rms, most = np.array([0.0, 0.0, 1.0, 1.0, np.nan]), np.array([0.0, 0.0, 0.0, np.nan, largest])
+    panel = panels(contact_run([("data", 0.0, 9.0)], Windows(np.arange(5.0), rms, most)))[-1]
+    assert panel.y.log is log
+    assert panel.y.low == (None if log else 0.0)

@@ -2305,3 +2305,29 @@ def test_bars_of_which_an_end_a_place_or_a_breadth_is_not_known_are_not_drawn(up
     sheet = one(Bars(at, start, end, breadth, VERMILION, upright=upright), x={"high": 9.0}, y={"high": 9.0})
     (path,) = [each.get("d") for each in parts(sheet, "path") if each.get("fill") == VERMILION]
     assert "nan" not in svg_of(sheet) and path.count("M") == path.count("Z") == 2
+
+
+@pytest.mark.parametrize(
+    ("place", "gaps"),
+    [
+        ("above", (None, 3.0, None, None)),
+        ("below", (None, None, None, 3.0)),
+        ("right", (None, 9.0, 3.0, None)),
+        ("upper right", (None, 9.0, 3.0, None)),
+        ("lower right", (None, None, 3.0, 3.0)),
+    ],
+)
+def test_the_legend_of_a_sheet_stands_in_the_middle_of_its_edge_or_at_the_end_of_its_right_one(place, gaps):
+    """Gaps to the sheet at the left, above, at the right and below, in points."""
+    sheet, panels = grid(6.0, 4.0, 1, 2)
+    for panel in panels:
+        panel.add(Line(X, Y, label="a"), Line(X, Y, VERMILION, label="longer"))
+    sheet.legend = Legend(place, 2)
+    found = layout(sheet)
+    (key,) = found.keys
+    own = (key.x, key.y, found.width - key.x - key.width, found.height - key.y - key.height)
+    for gap, wanted in zip(own, gaps, strict=True):
+        assert wanted is None or gap == pytest.approx(wanted)
+    if place in ("above", "below"):
+        assert own[0] == pytest.approx(own[2])
+    assert all(key.x > p.outer[2] or key.y > p.outer[3] or key.y + key.height < p.outer[1] for p in found.placed)
