@@ -1940,3 +1940,15 @@ def test_why_an_order_was_chosen_begins_with_a_capital_and_keeps_its_names(monke
 Order 4 has the lowest BIC of Hankel matrices.
 # Poles, zeros and gains
 """)
+
+
+def test_the_verdict_ends_with_the_error_of_the_model_that_is_written_in_place_of_the_choice(full):
+    own, error = words.verdict(full), words.error_text(full.score("linear"), full.span_rad)
+    said = f"The mirror file holds linear as asked, which leaves {error}."
+    assert full.chosen != "linear" and "as asked" not in " ".join(own)
+    assert words.verdict(full, "linear") == [*own, said]
+    assert words.verdict(full, full.chosen) == own
+    assert words.brief_verdict(full, "linear") == [*words.brief_verdict(full, full.chosen), said]
+    for written in ("linear", full.chosen):
+        lead = identification_page._lead(full, written)
+        assert (lead.headline, said in str(lead.blocks)) == (own[0], written == "linear")

@@ -28,9 +28,10 @@ from microrad.report.page import templates as scripts
 from microrad.report.page.templates import inputs_view
 from microrad.report.paper import bench
 from microrad.report.paper import diagrams as drawings
+from microrad.report.paper import figures as paper_figures
 from microrad.report.paper import page as paper_views
 from microrad.report.plotting.figure import Figure
-from microrad.report.plotting.sheet import Line
+from microrad.report.plotting.sheet import Line, Panel, Rule
 from microrad.report.quantities import minus
 from microrad.report.requirements import nearest, nearness
 from microrad.report.study import chain, page, words
@@ -2063,3 +2064,26 @@ def test_inputs_that_are_assumed_inferred_or_changed_are_found_by_their_rows(mon
         ("z.d", True, "4", "mission file, line 5"),
         ("z.e", True, "5", "[1] Table 2"),
     ]
+
+
+@pytest.mark.parametrize(("residual", "allowed"), [("radial", 3.0 / math.sqrt(2.0)), ("per-axis", 3.0)])
+def test_the_papers_error_is_held_against_the_share_of_one_axis_where_the_limit_is_radial(residual, allowed):
+    panel, ns = Panel(0, 0), SimpleNamespace
+    mission = ns(conventions=ns(residual=residual), requirement=ns(pointing_error_rad=3e-6))
+    paper_figures._limit(panel, mission)
+    assert [(rule.at, rule.upright) for rule in panel.all_of(Rule)] == [
+        (pytest.approx(-allowed), False),
+        (pytest.approx(allowed), False),
+    ]
+
+
+@pytest.mark.parametrize(("ahead", "said"), [(None, "narrow beam back"), (object(), "narrow beam back, point-ahead")])
+def test_the_sequence_names_both_divergences_the_point_ahead_where_there_is_one_and_the_rate(ahead, said):
+    ns = SimpleNamespace
+    mission = ns(
+        beacon=ns(divergence_rad=750e-6),
+        answer=ns(divergence_rad=40e-6),
+        point_ahead=ahead,
+        communication=ns(data_rate_bit_s=2.5e9),
+    )
+    assert drawings._sequence(mission) == ["wide beacon, 750 µrad", "answer, 40 µrad", said, "lock; 2.5 Gbit/s"]

@@ -851,3 +851,19 @@ def test_requirements_of_one_window_share_it_and_those_without_a_window_have_non
         (ErrorIndex("PDE", 0.01, 60.0), "slow drift"),
         (ErrorIndex("RPE", 0.02), "image"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("allowed", "said"), [(None, ""), (0.0, "nothing is left"), (math.inf, "any"), (0.5, "0.5 times"), (1.0, "1 times")]
+)
+def test_how_much_larger_a_source_may_be_has_words_for_nothing_and_for_any(allowed, said):
+    assert budget_words.allowed(SimpleNamespace(allowed=allowed)) == said
+
+
+def test_a_source_and_a_requirement_have_26_letters_beside_and_above_their_bars():
+    names = ["twenty-six------letters---", "twenty-seven----letters----", "z" * 34]
+    assert [len(name) for name in names] == [26, 27, 34]
+    each = judged_of(*((name, (3 - k) * 1e-6) for k, name in enumerate(names)), name="r" * 27)
+    (panel,) = figures.contributions([each]).sheet.panels
+    assert list(panel.y.words.values()) == [name if len(name) <= 26 else f"{name[:25]}…" for name in names]
+    assert panel.title == f"{'r' * 25}…"
