@@ -1696,3 +1696,35 @@ def test_a_mission_whose_mirror_is_no_table_is_refused_by_its_fault(tmp_path, mi
     held = manifest_reader.ReadManifest(tmp_path / "report.html", {"mission": report_entry(file, text=text)}, "")
     with pytest.raises(missionfile.MissionError, match="mirror"):
         manifest_reader.unpack_mission(held, tmp_path / "inside")
+
+
+@pytest.mark.parametrize(("name", "length"), [("mirror", 5), ("mission", 12)])
+def test_a_text_of_the_greatest_length_is_read_and_a_longer_one_is_told_with_its_name_and_length(
+    monkeypatch, name, length
+):
+    monkeypatch.setattr(manifest_reader, "MOST_TEXT", 4)
+    entry = {"file": "a file of a long name", "sha256": "0" * 64, "text_sha256": "0" * 64}
+    assert list(manifest_reader._file_faults(name, {**entry, "text": "four"})) == []
+    assert list(manifest_reader._file_faults(name, {**entry, "text": "f" * length})) == [
+        f"a {name} text of {length} characters"
+    ]
+    for lacking in ("file", "sha256", "text", "text_sha256"):
+        held = {**entry, "text": "four"} | {lacking: None}
+        assert list(manifest_reader._file_faults(name, held)) == [f"no {name} with file, sha256, text, text_sha256"]
+    assert list(manifest_reader._file_faults(name, "four")) == [f"no {name} with file, sha256, text, text_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "near"),
+    [
+        ("0.001", "1.9e-3", True),  # the last digit of the first
+        ("0.001", "2.1e-3", False),
+        ("1.9e-3", "0.001", False),  # one with a power has no last digit that counts
+        ("1.00e-3", "1.02e-3", True),
+        ("1e-3", "0.00102", True),
+        ("7", "7.3", True),
+        ("7", "8", False),
+    ],
+)
+def test_a_number_may_be_off_by_the_last_digit_of_that_which_was_written(was, now, near):
+    assert compared._near_in_words(was, now) is near
