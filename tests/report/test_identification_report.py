@@ -1952,3 +1952,31 @@ def test_the_verdict_ends_with_the_error_of_the_model_that_is_written_in_place_o
     for written in ("linear", full.chosen):
         lead = identification_page._lead(full, written)
         assert (lead.headline, said in str(lead.blocks)) == (own[0], written == "linear")
+
+
+def test_held_roots_have_a_damping_unless_they_are_real_and_fitted_ones_are_not_held():
+    """Real ones on either side of the axis: their damping is 1 or -1."""
+    fit = ns(
+        structure=ns(parameters=[ns(name="pole 2"), ns(name="zero 1"), ns(name="gain")]),
+        linear=ns(
+            poles=ns(frequencies_hz=(10.0, 20.0, 30.0, 40.0), dampings=(1.0, 0.1, -1.0, 0.25)),
+            zeros=ns(frequencies_hz=(5.0, 7.0, 9.0), dampings=(0.5, -1.0, -0.125)),
+        ),
+        creep=ns(time_constants_s=(0.5, 20.0)),
+    )
+    lags = [("creep lag 1", 0.5, "s", "chosen"), ("creep lag 2", 20.0, "s", "chosen")]
+    note = "held, from the frequency response"
+    rows = parameters._held(fit)
+    assert [(row.name, row.value, row.unit, row.note) for row in rows] == [
+        ("pole 1", 10.0, "Hz", note),
+        ("pole 3", 30.0, "Hz", note),
+        ("pole 4", 40.0, "Hz", note),
+        ("pole 4 damping", 0.25, "", note),
+        ("zero 2", 7.0, "Hz", note),
+        ("zero 3", 9.0, "Hz", note),
+        ("zero 3 damping", -0.125, "", note),
+        *lags,
+    ]
+    assert all(math.isnan(row.standard_error) for row in rows)
+    fit.linear = None
+    assert [(row.name, row.value, row.unit, row.note) for row in parameters._held(fit)] == lags

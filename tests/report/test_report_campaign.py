@@ -3242,3 +3242,25 @@ def test_rows_and_reasons_of_failed_rows_are_folded_where_a_terminal_is_narrow()
     table = " ".join(" ".join(lines[:end]).split())
     assert "987654321" in table and " 12 " in table
     assert all(f" {word} " in f" {table} " for word in (*reason.split(), "coupled.toml,", "25"))
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "drawn_at"),
+    [
+        (-5.0, 10.0, [-10.0, 20.0]),  # a width of the axis beyond either end
+        (-5.05, 10.05, []),
+        (-5.05, 4.0, [8.0]),
+        (None, 0.0, [0.0]),
+        (0.0, None, [0.0]),
+        (None, None, []),
+    ],
+)
+def test_a_limit_is_drawn_over_the_grid_up_to_a_width_of_the_axis_away(least, most, drawn_at):
+    panel = Panel(0, 0, x=Axis("x", low=0.0, high=10.0))
+    other = Limit("other", 1.0, 2.0, "")
+    summary = a_campaign([a_cell()], limits=(other, Limit("margin", least, most, "")))
+    shown = drawing.Shown("median margin", campaign_numbers.Scale(2.0, "dB"), [])
+    assert [(rule.at, rule.upright) for rule in drawing._limit_lines(panel, summary, shown)] == [
+        (pytest.approx(at), True) for at in drawn_at
+    ]
+    assert drawing._limit_lines(panel, summary, shown._replace(name="median point_ahead")) == []
