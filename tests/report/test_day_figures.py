@@ -1168,3 +1168,36 @@ def test_windows_without_an_error_or_of_none_do_not_count_in_the_median_that_tel
     panel = panels(contact_run([("data", 0.0, 9.0)], Windows(np.arange(5.0), rms, most)))[-1]
     assert panel.y.log is log
     assert panel.y.low == (None if log else 0.0)
+
+
+def test_the_contacts_of_a_day_have_a_row_for_each_station_of_either_downlink_with_its_own_contacts(monkeypatch):
+    """Stations stand as they come first; one of the direct downlink is one of the optical one, too."""
+
+    def contact(start_s, end_s):
+        return SimpleNamespace(start_s=start_s, end_s=end_s)
+
+    def way(*of, name=""):
+        return SimpleNamespace(name=name, contacts=[contact(a, b) for _, a, b in of], stations=[s for s, *_ in of])
+
+    shown = []
+    monkeypatch.setattr(figures, "timeline", lambda *given: shown.append(given) or "drawn")
+    pair = SimpleNamespace(span_s=(0.0, 900.0), leo=SimpleNamespace(name="LOW"), epoch=SimpleNamespace(text="now"))
+    relay = way(("", 50.0, 100.0), ("", 300.0, 350.0), name="HUB")
+    direct = way(("b", 10.0, 20.0), ("a", 30.0, 45.0), ("b", 60.0, 80.0))
+    optical = way(("c", 400.0, 410.0), ("a", 500.0, 520.0), ("c", 600.0, 950.0))
+    view = SimpleNamespace(pair=pair, umbra_s=np.array([[700.0, 800.0]]))
+    day = SimpleNamespace(relay=relay, direct=direct, optical=optical, view=view)
+    assert figures.contacts_figure(day) == "drawn"
+    ((rows, span_s, epoch),) = shown
+    assert (span_s, epoch) == ((0.0, 900.0), "now")
+    assert [(name, np.asarray(of).tolist()) for name, of in rows] == [
+        ("HUB", [[50.0, 100.0], [300.0, 350.0]]),
+        ("direct: b", [[10.0, 20.0], [60.0, 80.0]]),
+        ("direct: a", [[30.0, 45.0]]),
+        ("optical: c", [[400.0, 410.0], [600.0, 900.0]]),  # the span ends there
+        ("optical: a", [[500.0, 520.0]]),
+        ("eclipse of LOW", [[700.0, 800.0]]),
+    ]
+    shown.clear()
+    figures.contacts_figure(SimpleNamespace(**{**vars(day), "direct": None, "optical": None}))
+    assert [name for name, _ in shown[0][0]] == ["HUB", "eclipse of LOW"]

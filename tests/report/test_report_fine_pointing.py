@@ -2686,3 +2686,9 @@ def test_what_contradicts_linear_theory_is_told_of_each_controller_with_its_own_
     fine = loops_of(1e-6, every[1])
     fine.budget = ns(linear=True)
     assert words._theory_warnings(fine) == []
+
+
+def test_a_bound_above_all_that_is_left_leaves_nothing_to_gain():
+    found = words.room(loops_of(5.0, verified("PI", 2.0, 4.0), verified("LQG", 1.0, 6.0)))
+    assert (found.at_baseline, found.at_nearest, found.with_hysteresis) == (0.0, 0.0, 0.0)
+    assert (found.gained, found.holds) == (pytest.approx(-0.5), False)
