@@ -1201,3 +1201,19 @@ def test_the_contacts_of_a_day_have_a_row_for_each_station_of_either_downlink_wi
     shown.clear()
     figures.contacts_figure(SimpleNamespace(**{**vars(day), "direct": None, "optical": None}))
     assert [name for name, _ in shown[0][0]] == ["HUB", "eclipse of LOW"]
+
+
+@pytest.mark.parametrize("optical", [None, "a way"])
+@pytest.mark.parametrize("run", [None, "a run"])
+def test_the_figures_of_a_day_stand_in_their_order_each_of_its_own_part(monkeypatch, optical, run):
+    makers = ("contacts_figure", "_volume_figure", "_latency_figure", "ground_map", "_assumptions_figure")
+    for name in makers:
+        monkeypatch.setattr(figures, name, lambda day, name=name: (name, day))
+    monkeypatch.setattr(figures, "_along_figure", lambda day: [("along", day)])
+    for name in ("_optical_figure", "_contact_run_figure"):
+        monkeypatch.setattr(figures, name, lambda day, of, name=name: (name, day, of))
+    day = SimpleNamespace(optical=optical)
+    first, *rest = ((name, day) for name in makers)
+    ways = [("_optical_figure", day, optical)] if optical else []
+    runs = [("_contact_run_figure", day, run)] if run else []
+    assert figures.day_figures(day, run) == (first, ("along", day), *rest, *ways, *runs)
