@@ -749,3 +749,21 @@ def test_a_bundle_that_cannot_be_read_leaves_no_folder_and_one_that_can_until_it
         with pytest.raises((MissionError, CampaignError)):
             bundle.opened(json.dumps(spec | {"files": files}).encode())
     assert not list(tmp_path.glob("opened*"))
+
+
+def test_a_bundle_keeps_its_files_apart_in_the_folders_that_they_come_from(tmp_path):
+    """Two files of one name, one of them two new folders deep."""
+    there, here = tmp_path / "missions" / "links", tmp_path / "runs"
+    for folder in (there, here):
+        folder.mkdir(parents=True)
+    own = mission(there, "gallery").rename(there / "campaign.toml")
+    (here / "campaign.toml").write_text(HEAD.format(name="../missions/links/campaign") + DRAWN, encoding="utf-8")
+    campaign = load_campaign(here / "campaign.toml")
+    spec = bundle.packed(campaign, ())
+    assert json.loads(spec)["campaign"] == "runs/campaign.toml"
+    assert json.loads(spec)["files"].keys() == {"runs/campaign.toml", "missions/links/campaign.toml"}
+    opened = bundle.opened(spec)
+    found = opened.campaign
+    assert (found.path.parent.name, found.sha256) == ("runs", campaign.sha256)
+    assert found.mission.path.read_bytes() == own.read_bytes()
+    assert bundle.mission_sha256(found) == bundle.mission_sha256(campaign)
