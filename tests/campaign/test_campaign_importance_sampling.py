@@ -348,3 +348,94 @@ def test_what_lines_leave_counts_both_axes(monkeypatch):
     lines = [SimpleNamespace(name=name) for name in ("wheel", "cooler", "wheel")]
     closed = SimpleNamespace(open=SimpleNamespace(lines=lines))
     assert sampling._lines_rad(closed) == pytest.approx(np.sqrt(2.0 * 6e-12), rel=1e-12)
+
+
+def test_each_reading_beyond_the_fourth_has_a_word_of_the_next_stream(monkeypatch):
+    """Two sources of five plant steps a sample, and six readings as of a mirror of four drives."""
+    asked = []
+
+    def projected(seed, runs, purpose, first, along):
+        asked.append((seed, runs, int(purpose), first, along.tolist()))
+        return np.full((2, LANES), float(len(asked)))
+
+    monkeypatch.setattr(sampling, "_projected", projected)
+    step, sample = np.arange(40.0).reshape(10, 2, 2), 100.0 + np.arange(24.0).reshape(2, 6, 2)
+    by = Proposal(7, step, sample, np.array([2e-6, 1e-6]), 1.0, 2.0)
+    p = SimpleNamespace(purpose=[30, 41], seed="seed", steps_per_sample=5)
+    assert_array_equal(sampling._projections(p, by, "runs"), np.full((2, LANES), sum(range(1, 9))))
+    sources = [("seed", "runs", purpose, 35, step[:, i].tolist()) for i, purpose in enumerate((30, 41))]
+    assert asked[:2] == sources
+    for reading, (seed, numbered, purpose, first, along) in enumerate(asked[2:]):
+        stream, word = divmod(reading, 4)
+        assert (seed, numbered, purpose, first) == ("seed", "runs", sampling.kernels.SENSOR_PURPOSE + stream, 28)
+        wanted = np.zeros((8, 2))
+        wanted[[word, 4 + word]] = sample[:, reading]
+        assert along == wanted.tolist()
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 8), (5, 1), (6, 19), (8, 16), (11, 30)])
+def test_numbers_that_begin_and_end_within_a_slice_are_summed_once_each(monkeypatch, first, count):
+    """Number k of run r is k + 100 r here, in slices of eight that begin with four numbers of a word."""
+    words = []
+
+    def numbers(seed, runs, purpose, word, found):
+        words.append((seed, runs, purpose, word))
+        found.reshape(-1, LANES)[:] = 4 * word + np.arange(8.0)[:, None] + 100.0 * np.arange(LANES)
+
+    monkeypatch.setattr(sampling, "SLICE_SAMPLES", 8)
+    monkeypatch.setattr(sampling.kernels, "gaussian_kernel", numbers)
+    along = np.stack([1.0 + np.arange(count), 0.5 - np.arange(count) ** 2], axis=1)
+    found = sampling._projected("seed", "runs", 9, first, along)
+    k = first + np.arange(count)
+    wanted = [[float(u @ (k + 100.0 * run)) for run in range(LANES)] for u in along.T]
+    assert_allclose(found, wanted, rtol=1e-12)
+    begin = first // 4
+    assert words == [("seed", "runs", 9, word) for word in range(begin, (first + count - 1) // 4 + 1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("total", "settle", "slices"),
+    [
+        (50, 20, [(0, 8), (8, 16), (16, 20), (20, 28)]),
+        (23, 16, [(0, 8), (8, 16), (16, 23)]),
+        (8, 0, [(0, 8)]),
+        (5, 3, [(0, 3), (3, 5)]),
+    ],
+)
+def test_a_pilot_keeps_the_errors_of_the_first_slice_behind_the_settling_time(monkeypatch, total, settle, slices):
+    flown = []
+
+    def fly(p, state, reference, error, trace, shift):
+        flown.append(reference)
+        assert (p, state, trace.size, shift) == (("arrays", 5), ("start", 0), 0, sampling.kernels.UNSHIFTED)
+        if error.size:
+            error[:] = np.arange(error.size).reshape(error.shape)
+        assert (error.shape == (slices[-1][1] - settle, 3, LANES)) == (reference == slices[-1])
+
+    arrays = SimpleNamespace(
+        arrays=lambda loop, controller, seed: ("arrays", seed),
+        start=lambda loop, p, run: ("start", run),
+        reference=lambda loop, at, end: (at, end),
+    )
+    monkeypatch.setattr(sampling, "SLICE_SAMPLES", 8)
+    monkeypatch.setattr(sampling, "kernel_arrays", arrays)
+    monkeypatch.setattr(sampling.ensemble, "control_samples", lambda loop, span: (total, settle))
+    monkeypatch.setattr(sampling.kernels, "ensemble_loop", fly)
+    found = sampling._pilot(SimpleNamespace(axes=3), "controller", Span(1.0, 0.5, 5))
+    assert flown == slices
+    assert_array_equal(found.ravel(), np.arange(found.size))
+
+
+def test_levels_are_aimed_by_the_loop_and_the_straight_one_with_the_same_numbers_of_another_seed(monkeypatch):
+    taken, flown = [], []
+    monkeypatch.setattr(sampling.parts, "without", lambda loop, *which: taken.append((loop, {*which})) or "straight")
+    monkeypatch.setattr(sampling.linear, "straightened", lambda controller, loop: (controller, loop))
+    monkeypatch.setattr(sampling.linear, "close", lambda loop, controller: (loop, controller))
+    monkeypatch.setattr(sampling, "_lines_rad", lambda closed: ("lines", closed))
+    monkeypatch.setattr(sampling, "_pilot", lambda *given: flown.append(given) or f"errors {len(flown)}")
+    monkeypatch.setattr(sampling, "_levels", lambda *given: given)
+    found = sampling._aim("loop", "controller", Span(0.4, 0.05, 3), 5e-6, "sigma")
+    assert found == ("errors 1", "errors 2", ("lines", ("loop", "controller")), 5e-6, "sigma")
+    other = Span(0.4, 0.05, 3 ^ 0x54494C54)
+    assert flown == [("loop", "controller", other), ("straight", ("controller", "loop"), other)]
+    assert taken == [("loop", {parts.REFERENCE, parts.HYSTERESIS, parts.QUANTISATION, parts.LIMITS})]
