@@ -3,6 +3,7 @@
 import math
 from contextlib import closing
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -256,3 +257,36 @@ def test_the_mirror_of_the_second_cell_has_to_be_known_too(tmp_path):
         load_campaign(path)
     assert [fault.key for fault in caught.value.faults] == ["inputs.mirror"]
     assert 'the mirror "Another two axes on a hysteretic spring" has no table uncertainty' in str(caught.value)
+
+
+def bare(kind, **values):
+    """A scene with these values alone."""
+    made = object.__new__(kind)
+    for name, value in values.items():
+        object.__setattr__(made, name, value)
+    return made
+
+
+@pytest.mark.parametrize(("name", "tuned"), [("PI", "PI"), ("PI + feedforward", "PI"), ("LQG", "LQG")])
+def test_the_controller_of_several_axes_is_the_whole_feedback_of_the_named_one(monkeypatch, name, tuned):
+    asked = []
+
+    def design(scene, only):
+        asked.append((scene, only))
+        return SimpleNamespace(made=[SimpleNamespace(controller=SimpleNamespace(system="A", anti_windup="L"))])
+
+    monkeypatch.setattr(loops.coupled_study, "design", design)
+    scene = bare(loops.coupled_study.CoupledScene, table=SimpleNamespace(seed=5))
+    found = loops.MissionLoop(SimpleNamespace(controller=name), scene, "row", "span").tuned()
+    assert (found.name, found.system, found.anti_windup) == (name, "A", "L")
+    assert asked == [(scene, (tuned,))]
+
+
+def test_the_controller_of_one_axis_is_tuned_for_the_plants_of_the_missions_seed(monkeypatch):
+    study = loops.controller_study
+    monkeypatch.setattr(study, "plants", lambda scene, seed: ("plants", scene, seed))
+    monkeypatch.setattr(study, "tune", lambda *given: SimpleNamespace(controller=given))
+    table = SimpleNamespace(seed=5)
+    scene = bare(study.Scene, table=table)
+    found = loops.MissionLoop(SimpleNamespace(controller="PI"), scene, "row", "span").tuned()
+    assert found == ("PI", table, ("plants", scene, 5))
