@@ -577,3 +577,20 @@ def test_a_tail_of_one_row_or_run_is_told_in_the_singular():
     one = tail_of_time(np.array([1.0, 0.5, 0.0]), np.array([1.0, 0.25, 0.0]), 1, np.arange(3.0), (0.1,), 0.9)
     assert one.method == "share of the time of 1 row"
     assert tail_weighted(np.ones(1), np.zeros(1), (0.1,), 0.9).method == "importance sampling of the noise in 1 run"
+
+
+def test_one_row_knows_as_much_as_one_error_and_two_by_how_they_differ() -> None:
+    one = np.array([1.0, 0.5, 0.25, 0.0])
+    for probability in (0.3, 0.2):
+        found = tail_of_time(one, one**2, 1, np.arange(5.0), (probability,), 0.9)
+        assert found.effective_runs == pytest.approx(1.0)
+    assert found.survival.tolist() == one.tolist()
+    # of shares of 1/2 and 1/4: 3/8 times 5/8 over 1/64, the square of half their difference
+    both = np.array([[1.0, 0.5, 0.0], [1.0, 0.25, 0.0]])
+    two = tail_of_time(both.sum(axis=0), (both**2).sum(axis=0), 2, np.arange(4.0), (0.3,), 0.9)
+    assert two.method == "share of the time of 2 rows, which are independent"
+    assert two.effective_runs == pytest.approx(15.0)
+    with pytest.raises(ValueError, match=r"^a tail of no rows: at least one row has to have succeeded$"):
+        tail_of_time(one, one, 0, np.arange(5.0), (0.3,), 0.9)
+    with pytest.raises(ValueError, match=r"^a tail of no draws: at least one run has to have succeeded$"):
+        tail_weighted(np.zeros(0), np.zeros(0), (0.3,), 0.9)

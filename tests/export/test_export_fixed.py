@@ -975,3 +975,19 @@ def test_a_command_has_a_range_of_four_times_the_farthest_limit_or_what_was_comm
     form = SimpleNamespace(C=np.zeros((4, 1)), A=np.eye(1), B=np.ones((1, 1)))
     found = fixed_form._output_ranges(of, form, ideal, np.ones(1))
     assert found.tolist() == pytest.approx([4.0 * largest, 4.0 * largest, 0.024, 0.024])
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ends"),
+    [
+        (-math.inf, math.inf, (1 - 2**31, 2**31 - 1)),
+        (-math.inf, 0.995, (1 - 2**31, 99)),
+        (-0.125, math.inf, (-12, 2**31 - 1)),
+        (-0.3, 2.0, (-30, 200)),
+        (0.105, 0.3, (11, 30)),
+    ],
+)
+def test_a_converter_without_a_limit_counts_as_far_as_a_word(low, high, ends):
+    """A step of 2^-20 V is 0.78125 2^-13 counts of 10 mV."""
+    of = SimpleNamespace(resolution_v=0.01, minimum_v=low, maximum_v=high)
+    assert fixed_form._converter(of, 20) == fixed_form.Converter(838_860_800, 43, *ends)
