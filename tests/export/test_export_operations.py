@@ -13,7 +13,7 @@ import pytest
 import designs
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
-from microrad.export.flight import c_code, double_run, fixed, operations, rounding
+from microrad.export.flight import c_code, double_run, fixed, fixed_form, operations, rounding
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations
 from microrad.export.flight.rounding import RoundingBound
@@ -643,3 +643,52 @@ def test_single_precision_costs_each_part_its_own_error() -> None:
         "neither": [7.114e-10, 1.14e-10, 2.74e-09, 2.031e-10],
         "neither, without a converter": [7.114e-10, 1.14e-10, 2.74e-09, 2.031e-10],
     }
+
+
+def test_each_actuator_whose_plays_widen_is_compared_once_more_and_without_plays_nothing_widens() -> None:
+    """Three actuators of which none, two or all widen, over four plays of which one has no threshold."""
+    law = replace(
+        unlike_law(by_difference=False),
+        direct=np.array([50.0, -100.0, 20.0]),
+        play_threshold=np.array([1e-4, 0.0, 3e-4, 2e-4]),
+        play_weight=np.ones(4),
+        play_actuator=np.array([0, 1, 1, 2]),
+    )
+
+    def cost(slopes: tuple[float, float, float], of: InverseLaw = law) -> Operations:
+        return operations._inverse(replace(of, widening=np.array([[s, 50.0] for s in slopes])), 3, "single")
+
+    none, two = cost((0.0, 0.0, 0.0)), cost((1e-4, 0.0, 2e-4))
+    # each rate is held to its limit and multiplied by the slope; each slope and each play is asked whether it widens
+    clamped = Operations(multiplications=1, comparisons=3) * 3
+    assert two == none + clamped + Operations(comparisons=2 + 4, additions=3)
+    assert cost((1e-4, 3e-4, 2e-4)) == two + Operations(comparisons=1)
+    still = replace(law, play_threshold=np.zeros(0), play_weight=np.zeros(0), play_actuator=np.zeros(0, dtype=int))
+    assert cost((1e-4, 0.0, 2e-4), still) == cost((0.0, 0.0, 0.0), still)
+
+
+@pytest.mark.parametrize(("moves", "shown"), [(True, False), (False, True), (True, True)])
+def test_states_are_rounded_once_for_each_product_that_reads_them(moves: bool, shown: bool) -> None:
+    """Integrators alone move by what is read alone; a state keeps three bits below its word, another none."""
+    state, output = np.zeros((2, 5), dtype=np.int64), np.zeros((1, 4), dtype=np.int64)
+    state[0, 2], output[0, 3] = 5, 7
+    form = FixedForm(
+        16, (10, 11), (4, 6), (3,), fixed_form.Rows(state, (7, 6)), fixed_form.Rows(output, (8,)),
+        (-9,), (9,), (), None,  # type: ignore[arg-type]
+    )  # fmt: skip
+    of = replace(plain(None), inverse=None)
+    of = replace(of, system=lti.StateSpace(*(np.zeros((1, 1)) for _ in range(4))))
+    nothing = operations.fixed_operations(of, form)
+    if moves:
+        state[1, :2] = 3, -2
+    if shown:
+        output[0, 1] = 4
+    found = operations.fixed_operations(of, form)
+    terms, reads = 2 * moves + shown, moves + shown
+    assert found == replace(
+        nothing,
+        multiplications=nothing.multiplications + terms,
+        additions=nothing.additions + terms + reads,  # half a step, where bits are dropped
+        shifts=nothing.shifts + (1 + 2 + 2) * reads,
+        comparisons=nothing.comparisons + (2 + 3 * 2) * reads,
+    )
