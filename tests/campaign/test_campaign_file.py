@@ -1966,3 +1966,30 @@ def test_lists_and_switches_are_drawn_by_their_places_with_their_weights(tmp_pat
     twice = rms.replace('["2 urad", "1 urad"]', '["1000 nrad", "2 urad"]')
     (fault,) = faults(tmp_path, HEAD + distributed("jitter.rms", f"{TABLE}values = {twice}"), changes=changes)
     assert (fault.key, fault.reason) == ("inputs.jitter.rms.values", "has a value twice")
+
+
+def test_variables_of_an_optimisation_may_stand_in_tables_inside_each_other(tmp_path):
+    """Each table by its dotted key in one, by its names in another, and both ways in a third."""
+    head = f'{HEAD}{POWER}[optimise]\nminimise = "-margin"\nconfidence = 0.99\nrows = 64\nevaluations = 50\n'
+    limit = '[limits.margin]\nleast = "2 dB"\n'
+    small, large = 'low = "3 cm"\nhigh = "12 cm"\n', 'low = "15 cm"\nhigh = "20 cm"\n'
+    wide = 'low = "600 urad"\nhigh = "900 urad"\n'
+    tables = (
+        '[optimise.variables."terminals.leo_aperture"]\n{}[optimise.variables."terminals.geo_aperture"]\n{}'
+        '[optimise.variables."beacon.divergence"]\n{}',
+        "[optimise.variables.terminals.leo_aperture]\n{}[optimise.variables.terminals.geo_aperture]\n{}"
+        "[optimise.variables.beacon.divergence]\n{}",
+        '[optimise.variables.terminals]\nleo_aperture = {{ low = "3 cm", high = "12 cm" }}\n'
+        'geo_aperture.low = "15 cm"\ngeo_aperture.high = "20 cm"\n[optimise.variables."beacon.divergence"]\n{2}',
+    )
+    found = [loaded(tmp_path, head + each.format(small, large, wide) + limit) for each in tables]
+    wanted = [
+        ("terminals.leo_aperture", 0.03, 0.12),
+        ("terminals.geo_aperture", 0.15, 0.2),
+        ("beacon.divergence", 600e-6, 900e-6),
+    ]
+    for each in found:
+        assert [(v.key, v.low, v.high) for v in each.variables] == [
+            (key, pytest.approx(low), pytest.approx(high)) for key, low, high in wanted
+        ]
+        assert list(each.table.optimise.variables) == [key for key, _, _ in wanted]
