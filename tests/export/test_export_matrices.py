@@ -1237,7 +1237,7 @@ def test_of_several_unstable_poles_the_worst_is_told(poles, period_s, worst):
 
 
 def test_copies_that_only_others_make_alike_and_chains_that_nothing_reads_go_too():
-    """x2 is read from x1 = 2 x0 and x3 from x0, so that x2 = 6 x3; x5 reads x4, which reads x2, and nothing reads x5."""
+    """x2 reads x1 = 2 x0, and x3 x0, so that x2 = 6 x3; x5 reads x4, which reads x2, and nothing reads x5."""
     A, B = np.zeros((6, 6)), np.zeros((6, 1))
     B[:2, 0] = 1.0, 2.0
     A[2, 1], A[3, 0], A[4, 2], A[5, 4] = 3.0, 1.0, 1.0, 7.0

@@ -131,3 +131,9 @@ def test_each_reading_is_judged_by_its_own_conventions_on_the_run_that_it_asks_f
     links = [("gaussian", "ratio"), ("gain", "ratio"), ("gaussian", "decibel"), *[("gaussian", "ratio")] * 4]
     assert linked == [(data, place) for place, data in enumerate(links, 1)]
     assert [(r.residual_rad, r.margin_db, r.failure) for r in made] == [(k, -k, "") for k in range(1, 8)]
+
+
+def test_the_largest_run_is_one_of_those_on_the_missions_own_mirror(monkeypatch):
+    monkeypatch.setattr(tracking, "sine_runs", lambda cases, variants: [(cases, v) for v in variants])
+    monkeypatch.setattr(tracking, "worst", lambda runs, statistic: (statistic, *runs))
+    assert readings._largest("cases", "rms") == ("rms", ("cases", readings.Variant.GIVEN))
