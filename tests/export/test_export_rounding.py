@@ -17,7 +17,7 @@ import designs
 from drawn import plain as six_digits
 from microrad.core import kernels, lti
 from microrad.core.kernels.loop import inverse_drive
-from microrad.export.flight import double_run, rounding
+from microrad.export.flight import double_run, learning_rounding, rounding
 from microrad.export.flight.c_code import flight_code, vectors_text
 from microrad.export.linear_part.sections import compensated_states, sections
 from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
@@ -796,3 +796,55 @@ def test_a_bound_is_the_largest_of_two_actuators_and_grows_by_the_worse_of_them(
     assert found.command_v == pytest.approx(0.02 + 4.0 * rounding.UNIT * 4.0)
     assert (found.samples, found.per_sample_v) == (6, pytest.approx(0.01 / 3.0))
     assert found.words == (of, found.command_v, 0.013, found.per_sample_v, 6)
+
+
+class Learning:
+    """A learner that turns target and error of its actuator into numbers of its own."""
+
+    def __init__(self, law, phase, rounded):
+        self.law, self.phase, self.rounded = law, phase, rounded
+
+    def step(self, target, raw):
+        return target - 10.0 * (self.phase + 1), raw * self.law + target
+
+
+LEARNING = SimpleNamespace(
+    by_difference=False, direct=np.array([5.0, 6.0, 7.0]), bouc_wen=np.zeros((0, 12)), bouc_wen_actuator=np.zeros(0),
+    play_threshold=np.array([0.0, 0.5]), play_weight=np.ones(2), play_actuator=np.array([0, 1]),
+    widening=np.zeros((3, 2)), lag_keep=np.array([0.75, 0.5]), lag_weight=np.array([0.125, 0.25]),
+    lag_actuator=np.array([2, 0]),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_each_of_three_actuators_learns_from_its_own_target_and_error_behind_its_own_creep(monkeypatch, precision):
+    """Two samples of commands, targets, rates and errors, of three actuators each."""
+    n, runs = 3, learning_rounding.RUNS
+    gains = np.array([2.0, 3.0, 0.5])
+    if precision == "double":
+        monkeypatch.setattr(double_run, "laws", lambda of: of)
+        monkeypatch.setattr(double_run, "Learner", Learning)
+        of = SimpleNamespace(inverse=LEARNING, period_s=0.5, actuators=n, adaptation=gains.tolist())
+        made = double_run.Inverse(of, 2)
+        assert [(each.phase, each.rounded.unit, each.rounded.runs) for each in made.learners] == [
+            (phase, 0.0, 1) for phase in range(n)
+        ]
+    else:
+        made = object.__new__(learning_rounding._Single)
+        made.of, made.n, made.rounded = SimpleNamespace(inverse=LEARNING), n, lambda x, operations=1: x
+        made.learners = [Learning(gain, phase, None) for phase, gain in enumerate(gains)]
+        made.lag_share, made.lag_weight = 1.0 - LEARNING.lag_keep[:, None], LEARNING.lag_weight[:, None]
+        made.lag = np.zeros((2, runs))
+    lag = np.zeros(2)
+    for k, outputs in enumerate((np.arange(1.0, 13.0), np.array([4.0, 9, 1, 7, -2, 5, 8, 3, 6, -11, 12, 10]))):
+        target = outputs[3:6] - [0.25 * lag[1], 0.0, 0.125 * lag[0]]
+        added = outputs[9:] * gains + target
+        if precision == "double":
+            np.testing.assert_allclose(made.step(outputs), added, rtol=1e-12)
+            np.testing.assert_allclose(made.record.target[k], target - [10.0, 20.0, 30.0], rtol=1e-12)
+            assert made.record.rate[k].tolist() == outputs[6:9].tolist()
+            np.testing.assert_allclose(made.record.lag[k], lag, rtol=1e-12)
+        else:
+            found = made._inverse(np.repeat(outputs[:, None], runs, axis=1))
+            np.testing.assert_allclose(found, np.repeat(added[:, None], runs, axis=1), rtol=1e-12)
+        lag = LEARNING.lag_keep * lag + (1.0 - LEARNING.lag_keep) * added[[2, 0]]
