@@ -780,3 +780,50 @@ def test_a_mode_of_two_states_is_shown_by_both_of_them(pair, first):
     moved, Q = parting._ordered(T, np.eye(3), C, slice(0, 3))
     assert_allclose(Q @ moved @ Q.T, T, atol=1e-14)
     assert [parting._lead(moved, 0), parting._lead(moved, parting._lead(moved, 0))] == first
+
+
+PAIR = np.block([[np.array(rotation(TURN, 0.8)), np.eye(2)], [np.zeros((2, 2)), np.array(rotation(TURN, 0.8))]])
+CHAIN = 0.5 * np.eye(3) + np.eye(3, k=1)
+HIDING = {
+    "two alike that one input drives": (controller(0.9 * np.eye(2), [1, 2], np.eye(2), L=[0.3, 0.6]), 1),
+    "two alike that one output shows": (controller(0.9 * np.eye(2), np.eye(2), [1, -2], L=[0.3, 0.4]), 1),
+    "three alike between two inputs and two outputs": (
+        controller(0.8 * np.eye(3), [[1, 0], [0, 1], [1, 1]], [[1, 1, 0], [0, 1, 1]], L=[0.5, 0, 0.5]),
+        2,
+    ),
+    "three alike of which two are driven and one is shown": (
+        controller(0.8 * np.eye(3), [[1, 0], [0, 1], [1, 1]], [1, 1, 0], L=[0, 0.5, 0.5]),
+        1,
+    ),
+    "alike beside others": (
+        controller(np.diag([0.9, 0.3, 0.9, -0.6]), [1, 1, 1, 2], [[1, 1, 2, 0.5]], L=[0.2, 0, 0.2, 0.1]),
+        3,
+    ),
+    "the begin of a chain": (controller(CHAIN, [0, 0, 1], [0, 0, 1], L=[0.1, 0, 0.2]), 1),
+    "the end of a chain": (controller(CHAIN, [1, 0, 0], [1, 2, 3], L=[0.1, 0, 0]), 1),
+    "both ends of a chain": (controller(CHAIN, [0, 1, 0], [0, 1, 0.5], L=[0, 0.1, 0]), 1),
+    "the first of two pairs": (controller(PAIR, [0, 0, 1, 0], [0, 0, 1, 0.5], L=[0.1, 0, 0.1, 0.2]), 2),
+    "the last of two pairs": (controller(PAIR, [1, 0, 0, 0], [1, 0.2, 1, 1], L=[0.1, 0.2, 0, 0]), 2),
+    "two behind one": (
+        controller([[0.5, 1, 1], [0, 0.5, 0], [0, 0, 0.5]], [0, 1, 2], [1, 0, 0], L=[0, 0.1, 0.2]),
+        2,
+    ),
+    "one before two": (
+        controller([[0.5, 0, 1], [0, 0.5, 2], [0, 0, 0.5]], [0, 0, 1], [[1, 3, 0.5]], L=[0.1, 0.2, 0.3]),
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HIDING)
+def test_what_hides_in_chains_and_behind_equal_poles_is_taken_out(name):
+    of, left = HIDING[name]
+    less = minimal(of)
+    assert (less.system.order, sections(less).order) == (left, left)
+    driven = np.hstack([of.system.B, of.anti_windup])
+    powers = [of.system.C @ np.linalg.matrix_power(of.system.A, k) @ driven for k in range(2 * len(of.system.A))]
+    hankel = np.block([[powers[i + j] for j in range(len(of.system.A))] for i in range(len(of.system.A))])
+    assert np.linalg.matrix_rank(hankel, tol=1e-9) == left
+    inputs = noise(of, 300)
+    wanted, got = (replay(each.system, each.anti_windup, inputs, 0.5) for each in (of, less))
+    assert_allclose(got, wanted, rtol=0.0, atol=1e-12 * np.max(np.abs(wanted)))
