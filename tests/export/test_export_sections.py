@@ -827,3 +827,25 @@ def test_what_hides_in_chains_and_behind_equal_poles_is_taken_out(name):
     inputs = noise(of, 300)
     wanted, got = (replay(each.system, each.anti_windup, inputs, 0.5) for each in (of, less))
     assert_allclose(got, wanted, rtol=0.0, atol=1e-12 * np.max(np.abs(wanted)))
+
+
+@pytest.mark.parametrize(
+    ("name", "left"),
+    [
+        ("the begin of a chain", [2]),
+        ("the end of a chain", [0]),
+        ("both ends of a chain", [1]),
+        ("the first of two pairs", [2, 3]),
+        ("the last of two pairs", [0, 1]),
+        ("one before two", [0, 1, 2]),
+    ],
+)
+def test_what_stands_first_and_is_not_shown_or_last_and_is_not_driven_is_left_out_as_it_is(name, left):
+    found = modes(HIDING[name][0])
+    (block,) = found.found.slices
+    assert modes_module._stripped(found, np.arange(block.start, block.stop)).tolist() == left
+
+
+def test_nothing_is_left_of_a_chain_that_no_output_shows():
+    found = modes(controller(CHAIN, [1, 1, 1], [0, 0, 0]))
+    assert modes_module._stripped(found, np.arange(3)).tolist() == []
