@@ -849,3 +849,10 @@ def test_what_stands_first_and_is_not_shown_or_last_and_is_not_driven_is_left_ou
 def test_nothing_is_left_of_a_chain_that_no_output_shows():
     found = modes(controller(CHAIN, [1, 1, 1], [0, 0, 0]))
     assert modes_module._stripped(found, np.arange(3)).tolist() == []
+
+
+@pytest.mark.parametrize(("driven", "shown"), [([1, 0], [0, 1]), ([0, 1], [1, 0]), ([1, 0], [1, 0]), ([0, 1], [0, 1])])
+def test_a_pair_of_which_one_state_is_driven_or_shown_alone_is_left_whole(driven, shown):
+    of = controller(rotation(TURN, 0.8), driven, shown)
+    assert modes_module._stripped(modes(of), np.arange(2)).tolist() == [0, 1]
+    assert minimal(of) is of
