@@ -1993,3 +1993,32 @@ def test_variables_of_an_optimisation_may_stand_in_tables_inside_each_other(tmp_
             (key, pytest.approx(low), pytest.approx(high)) for key, low, high in wanted
         ]
         assert list(each.table.optimise.variables) == [key for key, _, _ in wanted]
+
+
+def test_a_grid_and_what_an_input_is_drawn_as_may_stand_in_tables_inside_tables(tmp_path):
+    own = 'distribution = "normal"\nmean = "4 W"\ndeviation = "0.25 W"\n'
+    wider = 'distribution = "normal"\nmean = "4.5 W"\ndeviation = "0.5 W"\n'
+    leo, geo, far = '["6 cm", "8 cm"]', '["15 cm", "20 cm", "25 cm"]', '["600 urad", "700 urad"]'
+    quoted = (
+        f'[inputs."communication.transmit_power"]\n{own}[inputs."communication.transmit_power".drawn_as]\n{wider}'
+        f'[grid]\n"terminals.geo_aperture" = {geo}\n"beacon.divergence" = {far}\n"terminals.leo_aperture" = {leo}\n'
+    )
+    nested = (
+        f"[inputs.communication.transmit_power]\n{own}[inputs.communication.transmit_power.drawn_as]\n{wider}"
+        f"[grid]\nterminals.geo_aperture = {geo}\nbeacon = {{ divergence = {far} }}\nterminals.leo_aperture = {leo}\n"
+    )
+    head = HEAD.replace("sobol", "random")
+    one, other = loaded(tmp_path, head + quoted), loaded(tmp_path, head + nested)
+    assert one.draws == other.draws
+    assert one.draws[0].distribution != one.draws[0].drawn_as is not None
+    # the tables of a file are in the order in which each begins: both of the terminals' before the beacon's
+    assert list(other.cells[0].values) == ["terminals.geo_aperture", "terminals.leo_aperture", "beacon.divergence"]
+    assert list(one.cells[0].values) == ["terminals.geo_aperture", "beacon.divergence", "terminals.leo_aperture"]
+    assert len(one.cells) == 12
+    assert sorted(sorted(cell.values.items()) for cell in one.cells) == sorted(
+        sorted(cell.values.items()) for cell in other.cells
+    )
+    apertures = {
+        (cell.file.mission.terminals.leo_aperture_m, cell.values["terminals.leo_aperture"]) for cell in one.cells
+    }
+    assert apertures == {(0.06, "6 cm"), (0.08, "8 cm")}
