@@ -2022,3 +2022,22 @@ def test_a_grid_and_what_an_input_is_drawn_as_may_stand_in_tables_inside_tables(
         (cell.file.mission.terminals.leo_aperture_m, cell.values["terminals.leo_aperture"]) for cell in one.cells
     }
     assert apertures == {(0.06, "6 cm"), (0.08, "8 cm")}
+
+
+def test_a_variable_that_is_drawn_or_set_too_is_told_with_the_first_table_that_has_it(tmp_path):
+    """The first variable is drawn, the second stands alone, the third in [set] and in [grid]."""
+    bounds = 'low = "4 W"\nhigh = "6 W"\n', 'low = "15 cm"\nhigh = "20 cm"\n', 'low = "3 cm"\nhigh = "12 cm"\n'
+    names = "communication.transmit_power", "terminals.geo_aperture", "terminals.leo_aperture"
+    tables = "".join(f'[optimise.variables."{name}"]\n{own}' for name, own in zip(names, bounds, strict=True))
+    body = (
+        f'{POWER}[set]\n"terminals.leo_aperture" = "6 cm"\n[grid]\n"terminals.leo_aperture" = ["7 cm", "8 cm"]\n'
+        f'[optimise]\nminimise = "-margin"\nconfidence = 0.99\nrows = 64\nevaluations = 50\n{tables}'
+        '[limits.margin]\nleast = "2 dB"\n'
+    )
+    told = [(fault.key, fault.reason, fault.expected) for fault in faults(tmp_path, HEAD + body)]
+    expected = "the key in one of the two tables"
+    assert told == [
+        ("grid.terminals.leo_aperture", "stands in [set] too", expected),
+        ("optimise.variables.communication.transmit_power", "stands in [inputs] too", expected),
+        ("optimise.variables.terminals.leo_aperture", "stands in [set] too", expected),
+    ]
