@@ -345,3 +345,106 @@ def test_an_identification_of_several_files_is_called_alike_in_both(monkeypatch,
         "input_unit": "mV",
         "output_unit": "um",
     }
+
+
+ODD_NAMES = ["a'b", 'a"b', "a\\b", "a\nb", "'); raise SystemExit('x"]
+
+
+@pytest.mark.parametrize("name", ODD_NAMES)
+def test_names_of_a_campaign_and_its_ledger_stay_names_in_python(folder, monkeypatch, name):
+    from microrad.campaign import run
+    from microrad.campaign.statistics import summary
+    from microrad.report.campaign import page, text
+
+    done = []
+    monkeypatch.setattr(run, "run_campaign", lambda *given: done.append(given[:-1]))
+    monkeypatch.setattr(run, "resume_campaign", lambda *given: done.append(given[:-1]))
+    monkeypatch.setattr(summary, "summarise_campaign", lambda ledger: ledger)
+    monkeypatch.setattr(text, "campaign_text", lambda found, width: f"text of {found}")
+    monkeypatch.setattr(page, "campaign_page", lambda found: f"page of {found}")
+    file, ledger, written = Path(name), Path(f"{name}.ledger"), Path(f"{name}.html")
+    assert executed(commands.campaign(file, ledger).python) == f"text of {ledger}\n"
+    assert executed(commands.resume(ledger).python) == f"text of {ledger}\n"
+    assert executed(commands.campaign_report(ledger, written).python) == ""
+    assert done == [(file, ledger), (ledger,)]
+    assert [(each.name, each.read_text("utf-8")) for each in folder.iterdir()] == [(written.name, f"page of {ledger}")]
+
+
+@pytest.mark.parametrize("name", ODD_NAMES)
+def test_every_word_of_an_identification_stays_a_word_in_python(folder, monkeypatch, name):
+    from microrad.lab import identify, recording
+
+    of = {
+        key: f"{key} {name}" for key in ("file", "drive", "output", "mirror", "V", "mrad", "finding", "check", "called")
+    }
+    read, written = [], []
+    monkeypatch.setattr(microrad, "read_recording", lambda *given, **more: (*given, *more.values()), raising=False)
+    monkeypatch.setattr(recording, "read_in", lambda found, drive, output: read.append((*found, drive, output)))
+    found = type("Found", (), {"unsupported": "", "chosen": "linear"})
+    monkeypatch.setattr(identify, "identify", lambda recordings, **how: written.append(how) or found)
+    monkeypatch.setattr(identify, "mirror_file_text", lambda found, called, model: f"{called} as {model}")
+    monkeypatch.setattr(
+        report, "write_identification", lambda found, page, **more: written.append((page, more["title"]))
+    )
+    monkeypatch.setattr(report, "identification_text", lambda found, model, **files: " ".join(map(str, files.values())))
+    action = commands.identify(
+        (Path(of["file"]),),
+        of["drive"],
+        of["output"],
+        Path(of["mirror"]),
+        name=of["called"],
+        units=(of["V"], of["mrad"]),
+        accept=(of["finding"],),
+        validate=(Path(of["check"]),),
+    )
+    mirror = Path(of["mirror"])
+    page = mirror.with_suffix(".html")
+    assert executed(action.python) == f"{mirror} {page}\n"
+    rest = of["drive"], of["output"], None, (of["finding"],), of["V"], of["mrad"]
+    assert sorted(read) == sorted([(of["file"], *rest), (of["check"], *rest)])
+    how, report_of = written
+    assert (how["input_unit"], how["output_unit"], how["lever_arm_m"]) == (of["V"], of["mrad"], None)
+    assert report_of == (page, of["called"])
+    assert mirror.read_text("utf-8") == f"{of['called']} as linear"
+
+
+@pytest.mark.parametrize("make", [commands.budget, commands.contacts, commands.design])
+def test_what_only_prints_is_typed_with_its_file_and_is_no_job(make):
+    action = make(Path("-my mission.toml"))
+    assert action.arguments == (make.__name__, "./-my mission.toml")
+    assert action.command == f"microrad {make.__name__} './-my mission.toml'"
+    assert (action.title, action.results) == ("", ())
+
+
+def test_a_report_of_a_ledger_is_typed_with_both_files_as_files():
+    action = commands.campaign_report(Path("-t.ledger"), Path("-my page.html"))
+    assert action.command == "microrad campaign report ./-t.ledger './-my page.html' --overwrite"
+    assert (action.title, action.results) == ("Report of -t.ledger", ("-my page.html",))
+
+
+@pytest.mark.parametrize(
+    ("options", "python", "typed_as"),
+    [
+        ({}, ("identify.MODELS", "admissible=False"), ""),
+        ({"static": True}, ("identify.STATIC[:2]", "admissible=False"), " --static"),
+        ({"admissible": True}, ("identify.MODELS", "admissible=True"), " --admissible"),
+        ({"static": True, "admissible": True}, ("identify.STATIC[:2]", "admissible=True"), " --static --admissible"),
+    ],
+)
+def test_each_switch_of_an_identification_is_its_own(options, python, typed_as):
+    action = commands.identify((Path("a.csv"),), "0", "1", Path("m.toml"), name="n", **options)
+    assert f"models={python[0]}, " in action.python and f" {python[1]}, " in action.python
+    assert action.command.endswith(f"--name n --mirror-file m.toml{typed_as}")
+
+
+def test_recordings_that_a_line_of_python_cannot_fit_end_it_with_the_reason_and_write_nothing(folder, monkeypatch):
+    from microrad.lab import identify, recording
+
+    monkeypatch.setattr(microrad, "read_recording", lambda *given, **more: given, raising=False)
+    monkeypatch.setattr(recording, "read_in", lambda found, drive, output: found)
+    found = type("Found", (), {"unsupported": "a line does as well", "chosen": "linear"})
+    monkeypatch.setattr(identify, "identify", lambda recordings, **how: found)
+    action = commands.identify((Path("a.csv"),), "0", "1", Path("m.toml"), name="n")
+    with pytest.raises(SystemExit, match=r"^a line does as well$"):
+        executed(action.python)
+    assert list(folder.iterdir()) == []
