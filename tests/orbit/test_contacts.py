@@ -1334,3 +1334,38 @@ def test_a_gap_between_two_samples_is_found_on_either_side_whichever_side_the_sp
     edges = np.array([0.0, 10.0, 50.25, 50.65, 90.0, 100.0])
     expected = edges[1:-1].reshape(-1, 2) if sign > 0.0 else edges.reshape(-1, 2)
     np.testing.assert_allclose(events.positive(visible, np.arange(0.0, 101.0)), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"boresight": (0.0, 0.0, 1.0, 0.0)}, "the boresight (0.0, 0.0, 1.0, 0.0) has no direction"),
+        ({"boresight": (1.0,)}, "the boresight (1.0,) has no direction"),
+        ({"boresight": (math.inf, 0.0, 1.0)}, "the boresight (inf, 0.0, 1.0) has no direction"),
+        ({"boresight": (0.0, 0.0, -math.inf)}, "the boresight (0.0, 0.0, -inf) has no direction"),
+        ({"slew_limit_rad_s": math.nan}, "a slew limit of nan rad/s is not above 0"),
+        ({"field_of_regard_rad": math.nan}, "Limits.field_of_regard_rad is nan deg: it must be finite"),
+        ({"sun_exclusion_rad": math.pi}, "Limits.sun_exclusion_rad is 180 deg: it must be finite, at least 0 deg"),
+    ],
+)
+def test_limits_of_too_many_numbers_or_without_an_end_are_refused(changed, message):
+    values = {key: getattr(UNLIMITED, key) for key in Limits.__slots__}
+    with pytest.raises(OrbitError) as refused:
+        Limits(**(values | changed))
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("wavelength_m", [0.0, -1.55e-6, math.nan])
+def test_no_wavelength_but_one_above_nothing_has_a_doppler_shift(wavelength_m):
+    with pytest.raises(OrbitError, match=r"is none; give one above 0 m"):
+        sight(leo(), SLOT, 0.0).doppler_hz(wavelength_m)
+    assert np.isfinite(sight(leo(), SLOT, 0.0).doppler_hz(1.55e-6)).all()
+
+
+@pytest.mark.parametrize(
+    "span_s",
+    [(math.nan, 5.0), (0.0, math.nan), (math.inf, math.inf), (-5.0, -math.inf), (7.0, 5.0), (-5.0, -5.0)],
+)
+def test_a_span_whose_ends_are_no_numbers_or_turned_holds_no_time(span_s):
+    with pytest.raises(OrbitError, match=f"^the span from {span_s[0]:g} s to {span_s[1]:g} s holds no time; give a"):
+        coarse_times(span_s, 60.0)

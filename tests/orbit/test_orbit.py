@@ -1177,3 +1177,10 @@ def test_one_time_of_several_that_the_tables_do_not_have_is_named(far_s, place):
     time_s[place] = math.nan
     with pytest.raises(OrbitError, match="a time of nan s after 2026-03-20T12:00:00Z is not a number"):
         epoch.earth_rotation_rad(time_s)
+
+
+@pytest.mark.parametrize("time_s", [math.nan, math.inf, -math.inf])
+def test_a_time_that_is_no_number_is_refused_by_an_orbit_of_a_formula_wherever_it_stands(time_s):
+    for times in ([time_s, 0.0], [0.0, 1.0, time_s]):
+        with pytest.raises(OrbitError, match=r"^orbit LEO: a time is not a finite number of seconds; check the span$"):
+            LEO.states(np.array(times))

@@ -2036,3 +2036,48 @@ def test_a_state_vector_that_does_not_fit_the_one_before_it_is_told_in_its_own_l
     line = text.split("\n").index(next(each for each in text.split("\n") if each.startswith(stamp(1800)))) + 1
     message = no_ephemeris(tmp_path, text)
     assert message.startswith(f"{tmp_path / 'a.txt'}, line {line}: from {stamp(1740)} to {stamp(1800)} {said}")
+
+
+@pytest.mark.parametrize(("row", "values"), [("EXTRA,", 18), ("", 17)])
+def test_a_row_of_more_values_than_columns_is_refused_and_the_rows_before_it_are_counted(tmp_path, row, values):
+    first, second = comma(FIELDS).splitlines()
+    text = f"{first}\n{second}\n{second}\n{row}{second}\n"
+    if values == 17:
+        assert len(elements(tmp_path, text)) == 3
+    else:
+        refused(tmp_path, text, "line 4: 18 values, but the first line names 17 columns; repair it")
+
+
+@pytest.mark.parametrize("number", ["90000", "90002", "10001"])
+def test_lines_of_two_satellites_are_refused_whichever_number_is_larger(tmp_path, number):
+    two = edited(LINE_2, 3, number)
+    refused(tmp_path, f"{LINE_1}\n{two}", f"line 1 is of catalogue number 90001, the line below it of {number}; put")
+
+
+@pytest.mark.parametrize("value", ["inf", "+inf", "-inf", "Infinity", "nan", "1e999"])
+@pytest.mark.parametrize("key", ["BSTAR", "MEAN_MOTION"])
+def test_a_number_without_an_end_is_none_of_an_element_set(tmp_path, key, value):
+    refused(tmp_path, comma({**FIELDS, key: value}), f"line 2: {key} is '{value}', not a finite number; write one such")
+
+
+@pytest.mark.parametrize("time_s", [math.nan, math.inf, -math.inf])
+def test_a_time_that_is_no_number_is_refused_as_such_by_elements(tmp_path, time_s):
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    words = f"a time is not a finite number; give seconds since {EPOCH.text}"
+    for ask in (
+        lambda: orbit.states(np.array([0.0, time_s, 7.0])),
+        lambda: orbit.require(0.0, time_s),
+        lambda: orbit.require(time_s, 0.0),
+    ):
+        with pytest.raises(OrbitError, match=words):
+            ask()
+
+
+def test_states_before_and_behind_the_days_of_trust_are_each_refused(tmp_path):
+    orbit = Sgp4Orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    most_s = mean_elements.MOST_ELEMENTS_AGE_S
+    first_s, last_s = -most_s - orbit.elements_age_s, most_s - orbit.elements_age_s
+    assert np.isfinite(orbit.states(np.array([first_s, last_s])).position_m).all()
+    for time_s, words in ((first_s - 1.0, "not valid yet"), (last_s + 1.0, "expired")):
+        with pytest.raises(OrbitError, match=f"the elements are {words}: "):
+            orbit.states(np.array([0.0, time_s]))
