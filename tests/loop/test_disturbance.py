@@ -1662,3 +1662,60 @@ def test_an_input_that_drives_nothing_takes_no_random_numbers(step_s):
         still = replace(given, B=inputs, lines=())
         assert (still.variance_rad2, discretise(still, step_s).Bd.shape) == (0.0, (2, 0))
         assert not psd(still, np.array([0.1, 1.0])).any()
+    ("build", "message"),
+    [
+        (
+            lambda: wheels(9, (1, 2), (1e-9, 2e-9, 3e-9), convention="radial"),
+            "2 harmonics and 3 coefficients; give one of each per line",
+        ),
+        (lambda: wheels(9, (), (1e-9,), convention="radial"), "0 harmonics and 1 coefficients; give one of each"),
+        (lambda: wheels(inf, (1,), (1e-9,), convention="radial"), "speed of the wheel is inf Hz"),
+        (lambda: wheels(9, (1, nan), (1e-9, 1e-9), convention="radial"), "harmonic of the wheel is nan times"),
+        (lambda: wheels(9, (1, 2), (1e-9, inf), convention="radial"), "coefficient of the wheel's harmonic 2 is inf"),
+        (
+            lambda: fit_bands((0, 1, 2), (1, 1, 1), convention="radial"),
+            "3 edges and 3 rms values; give finite edges, one more than rms values",
+        ),
+        (lambda: fit_bands((0, 1), (1, 1), convention="radial"), "2 edges and 2 rms values; give finite edges"),
+        (lambda: fit_bands((0, 1, 2), (nan, 1), convention="radial"), '"bands": rms between 0 and 1 Hz is nan rad'),
+        (lambda: fit_bands((0, 1, 2), (1, inf), convention="radial"), '"bands": rms between 1 and 2 Hz is inf rad'),
+        (lambda: fit_table([1, 2], [1, 1, 1], convention="radial"), "2 frequencies and 3 densities; give as many of"),
+        (lambda: fit_table([1, 2, 3], [1, 1, 1, 1], convention="radial"), "3 frequencies and 4 densities"),
+        (lambda: first_order(inf, 1, convention="radial"), "is inf rad"),
+        (lambda: first_order(1e-12, nan, convention="radial"), "is nan Hz"),
+        (lambda: body_pointing(inf, 3, 1), "body pointing error is inf rad"),
+        (lambda: body_pointing(nan, 3, 1), "body pointing error is nan rad"),
+        (lambda: body_pointing(1e-4, inf, 1), "number of sigmas of the body pointing error is inf"),
+        (lambda: body_pointing(1e-4, nan, 1), "number of sigmas of the body pointing error is nan"),
+        (lambda: body_pointing(1e-4, 3, 0), "bandwidth of the body pointing error is 0 Hz"),
+        (lambda: SpectralLine(inf, 1), "amplitude of a spectral line is inf rad"),
+        (lambda: SpectralLine(-1e-6, 1), "amplitude of a spectral line is -1e-06 rad"),
+        (lambda: SpectralLine(1e-6, inf), "frequency of a spectral line is inf Hz"),
+        (lambda: SpectralLine(1e-6, nan), "frequency of a spectral line is nan Hz"),
+        (lambda: discretise(olympus(), inf), "step of a sampled disturbance is inf s"),
+        (lambda: discretise(olympus(), -1e-3), "step of a sampled disturbance is -0.001 s"),
+    ],
+)
+def test_a_disturbance_is_refused_on_the_other_side_of_each_limit_too(build, message):
+    with pytest.raises(ValueError) as refused:
+        build()
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("value", [nan, inf, -inf])
+@pytest.mark.parametrize("key", ["A", "B", "C"])
+def test_each_matrix_of_a_shaping_filter_is_finite(key, value):
+    matrix = getattr(FILTER, key).copy()
+    matrix[-1, -1] = value
+    with pytest.raises(ValueError, match='filter of "given": A, B or C holds a number that is not finite; give finite'):
+        replace(FILTER, **{key: matrix})
+
+
+@pytest.mark.parametrize(
+    ("key", "shape"), [("A", (3, 2)), ("A", (3, 3)), ("A", (1, 1)), ("B", (1, 1)), ("B", (2, 1, 1)), ("C", (1, 1))]
+)
+def test_a_matrix_of_a_shaping_filter_that_is_too_small_or_too_large_is_refused(key, shape):
+    shapes = {"A": (2, 2), "B": (2, 1), "C": (1, 2)} | {key: shape}
+    with pytest.raises(ValueError) as refused:
+        replace(FILTER, **{key: -np.ones(shape)})
+    assert "A {A}, B {B} and C {C} do not fit together; give A (n, n)".format(**shapes) in str(refused.value)

@@ -519,3 +519,14 @@ def test_what_is_used_in_the_end_has_coarser_numbers_than_what_a_search_looks_at
     off = [np.max(np.abs(gain / lti.to_bits(gain, 24) - 1.0)) for gain in gains]
     assert off[0] > 1e-9 > off[1]
     assert used.anti_windup.tolist() == smooth.anti_windup.tolist()
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"command": -2.0}, "of -2 and a sensor noise factor of 1 "),
+        ({"sensor_noise": 0.0}, "of 0.01 and a sensor noise factor of 0 "),
+        ({"sensor_noise": math.nan}, "of 0.01 and a sensor noise factor of nan "),
+    ],
+)
+def test_each_weight_has_to_be_above_nothing(change, said):
+    with pytest.raises(ValueError, match=f"^LQG: a command weight {said}have no optimum: both have to be above 0"):
+        lqg.lqg_controller(FULL, replace(PLAIN, **change))

@@ -530,3 +530,22 @@ def test_a_refusal_names_the_index_that_was_asked_for_and_each_value_of_a_densit
     with pytest.raises(ValueError) as refused:
         call()
     assert str(refused.value) == words
+    ("freq_hz", "density"),
+    [
+        ([1.0, 2.0], [1.0, 1.0, 1.0]),
+        ([1.0, 2.0, 3.0], [1.0, 1.0]),
+        ([1.0, 2.0], [math.inf, 1.0]),
+        ([1.0, 2.0], [1.0, -math.inf]),
+        ([1.0, 2.0], [-1.0, 1.0]),
+        ([1.0, 2.0], [0.0, 1.0]),
+    ],
+)
+def test_a_density_has_one_finite_value_above_nothing_for_each_frequency(freq_hz, density):
+    with pytest.raises(ValueError, match="a density needs one finite value above 0 for each frequency above 0 Hz"):
+        tabulated_rms(freq_hz, density, ErrorIndex("APE"), "one")
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_recorded_motion_is_finite_to_its_last_sample(value):
+    with pytest.raises(ValueError, match=r"a recorded motion has the shape \(4,\): give one row of finite samples"):
+        recorded_rms([1.0, 2.0, 3.0, value], 0.01, ErrorIndex("APE"))

@@ -642,3 +642,81 @@ def test_a_number_of_a_loop_that_is_not_above_0_is_refused_by_its_name(name, val
         replace(LOOP, **{name: value})
     assert str(refused.value) == f"{name} of a loop is {value}: give a number above 0"
     assert replace(LOOP, amplifier_bandwidth_hz=math.inf, slew_v_s=math.inf).axes == 1
+@pytest.mark.parametrize("rate_hz", [20e3, 10e3 * (1 + 1e-8), 5e3, 10e3 * (1 - 1e-8)])
+def test_a_controller_of_a_faster_or_a_slower_rate_is_refused(rate_hz):
+    with pytest.raises(ValueError, match=r"^controller 'PID' is made for .* Hz, and this loop has 10000 Hz: make one"):
+        LOOP.margins(Controller.pid(0.0, 5e6, rate_hz=rate_hz))
+    assert LOOP.margins(Controller.pid(0.0, 5e6, rate_hz=10e3 * (1 + 1e-11))) is not None
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [(-2.0, -1.0), (1.0, 2.0), (0.0, 1.0), (-1.0, 0.0), (1.0, -1.0), (math.nan, 1.0), (-1.0, math.nan)],
+)
+def test_rest_has_to_lie_between_both_ends_of_the_drive(low, high):
+    said = re.escape(f"drive_range_v of a loop is ({low}, {high}) V: rest, 0 V, has to lie inside")
+    with pytest.raises(ValueError, match=said):
+        replace(LOOP, drive_range_v=(low, high))
+    assert replace(LOOP, drive_range_v=(-1e-3, 2.0)).drive_range_v == (-1e-3, 2.0)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, -math.inf])
+@pytest.mark.parametrize("name", ["rate_hz", "amplifier_bandwidth_hz", "slew_v_s"])
+def test_each_rate_of_a_loop_is_a_number_above_nothing(name, value):
+    with pytest.raises(ValueError, match=f"^{name} of a loop is {value}: give a number above 0$"):
+        replace(LOOP, **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"sensor_delay_s": 1.0}, r"sensor_delay_s of a loop is 1\.0 s, more than 2000 plant steps of 1e-05 s"),
+        ({"delay_s": math.nan}, r"delay_s of a loop is nan s, more than 2000"),
+        ({"steps_per_sample": -1}, r"-1 plant steps a sample: give a whole number, 1 or more"),
+        ({"optics": [[math.inf]]}, r"optics of a loop has shape \(1, 1\): give finite numbers of shape \(axes, 1\)"),
+        ({"optics": [[-math.inf]]}, r"optics of a loop has shape \(1, 1\): give finite numbers of shape \(axes, 1\)"),
+        (
+            {"mirror": mirrors.combine(STRAIGHT, STRAIGHT), "optics": [[1.0]]},
+            r"optics of a loop has shape \(1, 1\): give finite numbers of shape \(axes, 2\)",
+        ),
+        (
+            {"mirror": mirrors.combine(STRAIGHT, STRAIGHT), "optics": [[1.0, 0.0]], "gauge_noise_rad": 1e-7},
+            "a loop with a gauge needs one line-of-sight angle for each output of the mirror",
+        ),
+    ],
+)
+def test_a_loop_with_too_few_or_endless_parts_is_refused(changes, said):
+    with pytest.raises(ValueError, match=said):
+        replace(LOOP, **changes)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [0, 1, 2, 3])
+def test_each_gain_and_the_filter_of_a_pid_are_finite(place, value):
+    given = [1.0, 2.0, 3.0, 0.5]
+    given[place] = value
+    said = re.escape(f"gains {tuple(given[:3])} and a filter of {given[3]} s make no PID: give finite ones")
+    with pytest.raises(ValueError, match=f"^{said}$"):
+        Controller.pid(*given[:3], rate_hz=1e3, derivative_filter_s=given[3])
+
+
+@pytest.mark.parametrize(
+    ("axes", "rate_hz"), [(-1, 1e3), (1, -1e3), (1, math.nan), (1, math.inf), (2.0, 1e3), (math.nan, 1e3)]
+)
+def test_a_pid_has_whole_axes_and_a_rate_with_an_end(axes, rate_hz):
+    with pytest.raises(ValueError, match=f"^a PID of {axes} axes at {rate_hz} Hz: give one axis or more and a rate"):
+        Controller.pid(1.0, rate_hz=rate_hz, axes=axes)
+
+
+@pytest.mark.parametrize("margin", [0.0, 1.0, -0.5, 2.0, math.nan, math.inf])
+def test_a_modulus_margin_lies_between_nothing_and_one(margin):
+    with pytest.raises(ValueError, match=f"^modulus_margin is {re.escape(str(margin))}: give a number above 0 and"):
+        tune(LOOP, "PI", modulus_margin=margin)
+
+
+def test_a_controller_of_fewer_axes_than_its_loop_is_refused_as_one_of_more_is():
+    two = replace(LOOP, mirror=mirrors.combine(STRAIGHT, STRAIGHT))
+    for axes in (1, 3):
+        said = f"controller 'PID' has {axes} inputs, {axes} outputs and an anti-windup of shape \\({axes}, {axes}\\)"
+        with pytest.raises(ValueError, match=f"^{said}: a loop of 2 axes takes an error and gives a command for each"):
+            two.margins(Controller.pid(0.0, 1e6, rate_hz=10e3, axes=axes))
