@@ -811,3 +811,14 @@ def test_a_stage_that_never_ends_has_no_longest_time():
     assert (never.time_s.size, stage.longest_s) == (0, 0.0)
     ends = replace(CHAIN[0], duration_s=merged(np.array([0.7, 0.3]), np.array([0.25, 0.5])))
     assert ends.longest_s == 0.7
+@pytest.mark.parametrize("threshold", [math.inf, -math.inf, math.nan])
+def test_a_threshold_without_an_end_is_refused(threshold):
+    with pytest.raises(ValueError, match=f"^the threshold is {threshold:g} times the noise: it must be finite$"):
+        frame_detection_probability(1.0, threshold)
+
+
+@pytest.mark.parametrize("probability", [-0.1, math.nan, math.inf, 0.5 + 1e-9])
+def test_a_probability_that_no_time_has_is_refused(probability):
+    with pytest.raises(ValueError, match=r"^no time has the probability .*: it must lie above 0 and be at most 0\.5"):
+        ONE.quantile(probability)
+    assert ONE.quantile(0.5) == 1.0

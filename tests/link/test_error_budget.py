@@ -1536,3 +1536,42 @@ def test_a_refusal_of_a_requirement_has_six_digits_of_a_number_that_has_more(cal
     with pytest.raises(ValueError) as refused:
         call()
     assert str(refused.value) == said
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    ("kind", "name", "rest"),
+    [("periodic", "freq_hz", {}), ("drift", "period_s", {}), ("transient", "decay_s", {"period_s": 7.0})],
+)
+def test_each_time_of_a_source_is_finite_and_above_nothing(kind, name, rest, value):
+    with pytest.raises(ValueError, match=f"^a {kind} error: {name} is {value:g}; give a finite number above zero$"):
+        source(kind, **rest, **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("build", "said"),
+    [
+        (lambda: Spread("gaussian", -math.inf), "a spread of mean -inf and width 0: give finite ones, the width >= 0"),
+        (lambda: Spread("gaussian", 1.0, math.nan), "a spread of mean 1 and width nan: give finite ones"),
+        (lambda: source("constant", gains=[math.inf, 1.0]), "its gains are [inf, 1.0]; give a finite one"),
+        (lambda: source("constant", gains=[1.0, -math.inf]), "its gains are [1.0, -inf]; give a finite one"),
+        (lambda: replace(APE, confidence=math.nan), "a confidence of nan: give a share above 0 and below 1"),
+        (lambda: replace(APE, confidence=-0.5), "a confidence of -0.5: give a share above 0 and below 1"),
+        (lambda: replace(APE, limit_rad=math.nan), "a limit of nan rad; give a finite one above zero"),
+        (lambda: replace(APE, axes=(0, -1)), "axes (0, -1): give one, or two for the radial error"),
+        (lambda: budget(two(), [APE], [Correlation("c", "b", 0.5)]), "correlation of c and b: name two sources out of"),
+        (lambda: budget(two(), [APE], [Correlation("c", "d", 0.5)]), "correlation of c and d: name two sources out of"),
+        (lambda: budget(two(), [APE], [Correlation("a", "b", math.nan)]), "the coefficient is nan; give one from -1"),
+        (lambda: budget(two(), [APE], [Correlation("a", "b", 1.001)]), "the coefficient is 1.001; give one from -1"),
+    ],
+)
+def test_a_budget_is_refused_on_the_other_side_of_each_limit_too(build, said):
+    with pytest.raises(ValueError) as refused:
+        build()
+    assert said in str(refused.value)
+
+
+def test_a_third_source_of_more_or_of_fewer_axes_than_the_first_is_named():
+    first, second = (replace(source("random", gains=np.ones(2)), name=name) for name in "ab")
+    for axes in (1, 3):
+        third = replace(source("random", gains=np.ones(axes)), name="c")
+        with pytest.raises(ValueError, match=f"^c has gains for {axes} axes, and a for 2; give all as many$"):
+            contributions([first, second, third], APE)

@@ -658,3 +658,47 @@ def test_fades_of_both_ends_that_never_begin_last_for_ever_or_are_not_there(marg
     found = pf.fades_of_both(*ends, margin_db)
     assert (float(found.per_second), float(found.mean_duration_s)) == (0.0, lasting_s)
     assert float(found.share_of_time) > 0.9 if lasting_s else float(found.share_of_time) == 0.0
+@pytest.mark.parametrize(
+    "curve",
+    [
+        lambda power: -0.1 + 0.0 * power,
+        lambda power: np.where(power < 0.5, 0.2, -1e-3),
+        lambda power: np.where(power < 0.5, 1.001, 0.1),
+        lambda power: np.append(0.0 * power, 0.0),
+        lambda power: (0.0 * power)[1:],
+    ],
+)
+def test_a_curve_of_errors_has_one_ratio_for_each_power_neither_below_nothing_nor_above_one(curve):
+    with pytest.raises(
+        ValueError, match="the bit error ratio does not give one value from 0 to 1 for each power; corr"
+    ):
+        pf.mean_error_ratio(SKEW, 9.0 * URAD, 0.0, curve)
+
+
+@pytest.mark.parametrize(
+    ("freq_hz", "psd", "said"),
+    [
+        ([1.0, 2.0, 3.0], [[1.0] * 4] * 2, "frequencies of shape (3,) and spectral densities of shape (2, 4) do not"),
+        ([1.0, 2.0, 3.0], [[1.0] * 2] * 2, "frequencies of shape (3,) and spectral densities of shape (2, 2) do not"),
+        ([1.0, 2.0], [[1.0] * 2] * 3, "frequencies of shape (2,) and spectral densities of shape (3, 2) do not fit"),
+        ([[1.0, 2.0]], [[1.0] * 2] * 2, "frequencies of shape (1, 2) and spectral densities of shape (2, 2) do not"),
+        ([1.0, math.nan], [[1.0] * 2] * 2, "the frequencies do not rise from 0 Hz or above; sort them, each once"),
+        ([-math.inf, 1.0], [[1.0] * 2] * 2, "the frequencies do not rise from 0 Hz or above; sort them, each once"),
+        ([1.0, 2.0], [[1.0] * 2, [1.0, math.inf]], "the spectral density is inf rad^2/Hz: it must be finite"),
+    ],
+)
+def test_a_spectrum_of_too_many_or_too_few_rows_or_of_no_numbers_is_refused(freq_hz, psd, said):
+    with pytest.raises(ValueError) as refused:
+        pf.motion_of_spectrum(freq_hz, psd)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("rms", "velocity", "axis"),
+    [((3.0, 2.0), (0.0, 1e-4), "x"), ((3.0, 2.0), (1e-4, 0.0), "y"), ((0.0, 2.0), (1e-4, 1e-4), "x"),
+     ((3.0, 0.0), (1e-4, 1e-4), "y")],
+)  # fmt: skip
+def test_an_axis_that_moves_has_a_velocity_and_one_that_does_not_has_none(rms, velocity, axis):
+    jitter = Jitter((0.0, 0.0), tuple(each * URAD for each in rms))
+    with pytest.raises(ValueError, match=f"^axis {axis} has a jitter rms of .*; give both above 0, or both 0"):
+        pf.fades(jitter, velocity, THETA, 3.0)

@@ -871,3 +871,13 @@ def test_a_loop_whose_output_stands_still_is_not_wide(model):
     loop = model.loop(1.0, 1.0)
     assert loop.width == 0.0
     assert repr(loop) == "<HysteresisLoop at 1 Hz: 500 samples, 0.00% wide>"
+
+
+@pytest.mark.parametrize(
+    ("thresholds", "weights"),
+    [((0.0,), 2), ((0.0, 1.0, 2.0), 2), ((), 1), ((0.0, 2.0, 1.0), 3), ((0.0, nan), 2), ((-1.0,), 1)],
+)
+def test_plays_have_a_weight_for_each_threshold_and_none_to_spare(thresholds, weights):
+    with pytest.raises(ValueError, match=r"V with .* weights make no Prandtl-Ishlinskii operator|give finite numbers"):
+        PrandtlIshlinskii(thresholds, (1e-6,) * weights)
+    assert PrandtlIshlinskii((0.0, 1.0), (1e-6, 2e-6)).thresholds_v == (0.0, 1.0)

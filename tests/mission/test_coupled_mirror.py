@@ -1375,3 +1375,11 @@ def test_the_decay_of_an_element_exceeds_what_its_own_gamma_and_eta_take_off_it(
     else:
         (fault,) = refusal(text)
         assert (fault.key, fault.expected) == ("mirror.hysteresis.2.alpha", "above 1.125 1/V")
+
+
+@pytest.mark.parametrize("version", ["1", "0", "-2", "3", "true", "[2]"])
+def test_a_version_below_or_above_that_of_several_axes_is_none(tmp_path, version):
+    path = tmp_path / "mirror.toml"
+    path.write_text(edited(("version = 2", f"version = {version}")), encoding="utf-8")
+    fault = only_fault(lambda: load_coupled_mirror(path))
+    assert fault.key.endswith("version") and fault.reason == "is no version of a mirror of several axes"

@@ -2537,3 +2537,18 @@ def test_a_beam_is_held_against_the_obscuration_of_the_terminal_that_it_leaves(o
     terminals = SimpleNamespace(leo_obscuration=own, leo_aperture_m=0.07, geo_obscuration=0.9, geo_aperture_m=0.9)
     found = list(obscuration_fits(terminals, SimpleNamespace(beam=SimpleNamespace(radius_m=radius_m))))
     assert [problem.key for problem in found] == ["communication.beam.radius"] * (not fits)
+
+
+@pytest.mark.parametrize("months", [1, 2, 11, 13, 24])
+def test_a_year_has_neither_more_nor_fewer_than_twelve_months(months):
+    with pytest.raises(ProblemsError) as refused:
+        Monthly(PLAIN).read([1.0] * months)
+    assert refused.value.problems[0].reason == f"is a list of {months}, and a year has 12 months"
+    assert Monthly(PLAIN).read([2.0] * 12) == (2.0,) * 12
+
+
+def test_a_file_of_just_the_most_lines_and_bytes_is_read_and_one_more_is_not():
+    most = b"a = 1\n" + b"\n" * 9_999
+    assert read_as(most, most_bytes=len(most)) == "{'a': 1} [] "
+    assert "is larger than 10 kB" in read_as(most, most_bytes=len(most) - 1)
+    assert "has more than 10000 lines" in read_as(most + b"\n", most_bytes=len(most) + 1)
