@@ -829,3 +829,18 @@ def test_recordings_of_one_drive_have_the_same_sensors_and_each_its_own_data(tmp
     assert refusal(tmp_path, f'{common}{second}["x", "y"]') == (
         f"{path}: {b}: the same data as {a}; give each recording once, and for validation one that is not fitted."
     )
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('positions = [["0 mm", "1 mm"]]', "positions has 1 place"),
+        ('positions = [["0 mm", "1 mm"], ["0 mm", "2 mm"], ["1 mm", "2 mm"]]', "positions has 3 places"),
+        ("signs = [[1]]", "signs has rows of 1 items and there are 2 outputs and 1 input; give a row for each"),
+        ("signs = [[1], [1], [1]]", "signs has rows of 1, 1, 1 items and there are 2 outputs and 1 input"),
+        ("signs = [[1, -1], [1]]", "signs has rows of 2, 1 items and there are 2 outputs and 1 input"),
+        ("signs = [[1], [1, -1]]", "signs has rows of 1, 2 items and there are 2 outputs and 1 input"),
+    ],
+)
+def test_fewer_or_more_places_and_signs_than_two_outputs_are_refused(tmp_path, line, words):
+    np.savez(tmp_path / "a.npz", u=DRIVE[:, 0], y=OUTPUT[:, 0], x=-2.0 * OUTPUT[:, 0], fs=RATE_HZ)
+    entry = '[recording.a]\nfile = "a.npz"\ninput = "u"\noutput = ["y", "x"]\n'
+    assert words in refusal(tmp_path, f"{line}\n{entry}")

@@ -1,5 +1,7 @@
 """Reversals and rates of a drive, which hang on no single step or spike, and which samples of a record are used."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -388,3 +390,14 @@ def test_the_noisiest_of_two_drives_is_told_in_either_order():
 )
 def test_a_sweep_of_a_step_or_two_goes_from_its_first_sample_to_its_last(sweep, fastest):
     assert records._fastest_tenth(np.array(sweep)) == fastest
+@pytest.mark.parametrize("arm", [0.0, -0.5, math.inf, -math.inf, math.nan])
+@pytest.mark.parametrize("unit", ["mm", "urad"])
+def test_a_lever_arm_is_a_length_above_nothing_with_an_end(unit, arm):
+    assert told(Units, "V", unit, arm) == f"the lever arm is {arm!r} m; give a positive length in metres."
+
+
+@pytest.mark.parametrize(("drive", "output"), [(0 * WAVE + 4.0, WAVE), (WAVE, 0 * WAVE), (0 * WAVE, 0 * WAVE)])
+def test_a_drive_that_stands_still_is_refused_as_an_output_is(drive, output):
+    assert told(si_records, [of(WAVE, WAVE, name="good"), of(drive, output)], Units()) == (
+        "r: drive or output is constant in the part that is fitted."
+    )

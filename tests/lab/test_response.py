@@ -600,3 +600,12 @@ def test_rates_that_hardly_differ_are_told_apart():
     second = replace(second, rate_hz=first.rate_hz * (1 + 4e-7))
     words = told(response.check_alike, [first, second], "used")
     assert f"is {second.rate_hz:.17g} Hz and that of a {first.rate_hz:.17g} Hz" in words
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(10.0, np.nan), (10.0, np.inf), (-5.0, 50.0), (10.0, 0.0), (10.0, -50.0), (-np.inf, 50.0)]
+)
+def test_a_band_has_two_ends_above_nothing(low, high):
+    assert told(response._band_edges, 0.5 * np.arange(401), low, high, 9, 8) == (
+        f"the band {low:g} to {high:g} Hz is empty; give a lower and a higher frequency."
+    )

@@ -1575,3 +1575,17 @@ def test_a_third_source_of_more_or_of_fewer_axes_than_the_first_is_named():
         third = replace(source("random", gains=np.ones(axes)), name="c")
         with pytest.raises(ValueError, match=f"^c has gains for {axes} axes, and a for 2; give all as many$"):
             contributions([first, second, third], APE)
+
+
+def test_windows_that_just_fill_their_period_of_observation_lie_in_it():
+    """The PDE's two windows end with the period, and the PRE's second one begins a whole period behind the first."""
+    assert asked("PDE", 2.0, 7.0, observation_s=9.0).observation_s == 9.0
+    with pytest.raises(
+        ValueError, match=r"PDE: both windows have to lie in the observation period of 8\.999 s; give it"
+    ):
+        asked("PDE", 2.0, 7.0, observation_s=8.999)
+    assert asked("PRE", 2.0, 7.0, observation_s=7.0).observation_s == 7.0
+    with pytest.raises(
+        ValueError, match=r"PRE: its windows lie in two observation periods of 7\.001 s; space them wider"
+    ):
+        asked("PRE", 2.0, 7.0, observation_s=7.001)

@@ -2552,3 +2552,9 @@ def test_a_file_of_just_the_most_lines_and_bytes_is_read_and_one_more_is_not():
     assert read_as(most, most_bytes=len(most)) == "{'a': 1} [] "
     assert "is larger than 10 kB" in read_as(most, most_bytes=len(most) - 1)
     assert "has more than 10000 lines" in read_as(most + b"\n", most_bytes=len(most) + 1)
+
+
+def test_a_list_of_keys_may_have_just_the_most_items():
+    assert KeyList(None, most=2).read(["a", "b"]) == ("a", "b")
+    with pytest.raises(ProblemsError):
+        KeyList(None, most=2).read(["a", "b", "c"])
