@@ -1368,3 +1368,24 @@ def test_links_alone_have_no_mirror_to_identify_and_two_cells_are_looked_at():
 def test_drawn_switches_and_lists_are_told_as_the_file_has_them():
     even = OneOf((1.0, 2.0), (0.5, 0.5), (False, ["1 urad", "2 urad"]), True)
     assert even.words("") == "one of 1 = false, 2 = [1 urad, 2 urad]"
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "said"),
+    [
+        (
+            "12.5 urad",
+            "12.5 urad",
+            """limits.residual_rms.most = "12.5 urad" is not above least: a range that goes up ()""",
+        ),
+        (
+            "12.5 urad",
+            "0.0125 mrad",
+            """limits.residual_rms.most = "0.0125 mrad" is not above least: a range that goes""",
+        ),
+        ("12.5 urad", "12.6 urad", "Limit("),
+    ],
+)
+def test_a_limit_whose_ends_are_the_same_is_no_range(least, most, said):
+    found = noted(checks.limit, "residual_rms", {"least": least, "most": most}, ["residual_rms"])
+    assert found.startswith(said)

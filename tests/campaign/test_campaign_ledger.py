@@ -1373,3 +1373,23 @@ def test_a_ledger_that_cannot_be_opened_to_write_is_left_to_the_next_writer(path
         assert is_written(path)
         ledger.note("state", "running")
     assert not is_written(path)
+
+
+@pytest.mark.parametrize("version", [0, 2, 65535])
+def test_bytes_of_an_older_format_are_refused_as_those_of_a_newer_one_are(version):
+    data = packed(0)
+    other = data[:8] + version.to_bytes(2, "little") + data[10:-32]
+    assert f"format {version}, and this microrad reads 1" in said(
+        chunk_format.unpack_chunk, other + hashlib.sha256(other).digest()
+    )
+
+
+@pytest.mark.parametrize("version", [0, -1, 2])
+def test_a_ledger_of_an_older_format_is_refused_as_that_of_a_newer_one_is(path, version):
+    filled(path, 1)
+    with contextlib.closing(sqlite3.connect(path)) as ledger:
+        ledger.execute(f"PRAGMA user_version = {version}")
+    for write in (True, False):
+        assert said(Ledger.open, path, write=write) == (
+            f"{path} is a ledger of format {version}, and this microrad knows 1: use the microrad that began it"
+        )

@@ -1722,3 +1722,12 @@ def test_a_recorded_run_is_held_within_the_counts_that_the_code_can_give():
     assert_allclose(found.commands, [[-4.5, 1.0], [7.25, -4.5], [7.25, -4.5]], rtol=1e-12)
     assert (found.inputs is v.inputs, found.saturated, found.rate_clamped) == (True, 3, 4)
     assert v.commands[0, 0] == -9.0, "the run itself stays as it is"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_number_beyond_single_precision_is_refused_whichever_sign_it_has(sign):
+    said = f"{sign * 1e39!r} is beyond single precision, which ends at 3.403e+38: export double precision"
+    with pytest.raises(ExportError, match=f"^{re.escape(said)}$"):
+        real(sign * 1e39, "single")
+    assert float(real(sign * 1e39, "double")) == sign * 1e39
+    assert float(real(sign * inf, "single").removesuffix("f")) == pytest.approx(sign * 3.4028235e38, rel=1e-6)

@@ -1099,3 +1099,33 @@ def test_a_refusal_of_an_object_has_the_name_that_was_said_of_it():
         import_control(python_control.tf([1.0], [1.0, -5.0]), GIVEN, "our rig")
     with pytest.raises(ExportError, match=r"^our rig: a float; give a control\.StateSpace or a control\.TransferF"):
         import_control(2.0, GIVEN, "our rig")
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize(
+    "key",
+    ["travel_rad", "rate_limit_v_s", "bias_v", "drive_min_v", "drive_max_v", "excited_from_hz", "excited_to_hz",
+     "normalise_at_hz"],
+)  # fmt: skip
+def test_each_number_that_is_given_beside_a_model_is_finite(tmp_path, key, value):
+    path = save(tmp_path, **roots())
+    with pytest.raises(ExportError) as refused:
+        import_mat(path, replace(GIVEN, **{key: value}))
+    assert str(refused.value).endswith(f"model.mat: {key} = {value} is not finite; give a number")
+
+
+@pytest.mark.parametrize("at_hz", [1.0, 5000.0])
+def test_a_gain_may_be_taken_at_either_end_of_the_band(tmp_path, at_hz):
+    assert import_mat(save(tmp_path, **roots()), replace(GIVEN, normalise_at_hz=at_hz)).startswith("# Mirror imported")
+
+
+@pytest.mark.parametrize(
+    ("key", "shape", "wanted"),
+    [("A", (3, 2), (3, 3)), ("B", (2, 1), (3, 1)), ("B", (4, 1), (3, 1)), ("C", (1, 2), (1, 3)), ("C", (1, 4), (1, 3)),
+     ("D", (1, 2), (1, 1)), ("D", (2, 1), (1, 1))],
+)  # fmt: skip
+def test_each_matrix_that_is_too_small_or_too_large_is_named(tmp_path, key, shape, wanted):
+    path = save(tmp_path, **states(**{key: np.ones(shape)}))
+    with pytest.raises(ExportError) as refused:
+        import_mat(path, GIVEN)
+    assert f"model.mat: {key} has shape {shape}, where {wanted} fits the others" in str(refused.value)

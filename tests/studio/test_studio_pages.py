@@ -3123,3 +3123,28 @@ def test_a_panel_tells_the_fault_of_a_ledger_of_which_no_row_could_be_read(sessi
     asyncio.run(panel._look())
     assert "is no ledger" in panel._fault.text
     assert (panel._fault.visible, panel._rows.visible) == (True, False)
+
+
+@pytest.mark.parametrize(
+    ("state", "code", "look"),
+    [
+        ("queued", None, "soft"),
+        ("running", None, "soft"),
+        ("cancelled", 130, "soft"),
+        ("failed", 2, "no"),
+        ("failed", 1, "no"),
+        ("lost", None, "no"),
+        ("unreadable", None, "no"),
+        ("done", 0, "yes"),
+        ("done", 1, "no"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["study", "campaign", "identification", "export"])
+def test_every_state_of_every_kind_of_job_has_its_colour_and_its_buttons(session, cards, kind, state, code, look):
+    job = Job(3, session.folder, state, kind, "mine", code=code)
+    card = shown(runs_jobs._Card(cards, job), job)
+    assert [name for name in ("yes", "no", "soft") if name in card.state.classes] == [look]
+    over = state not in ("queued", "running")
+    assert (card.cancel.visible, card.drop.visible, card.bar.visible) == (not over, over, state == "running")
+    assert ("open" in card.details.props) is (kind in ("study", "export"))
+    assert card.again.visible is card.page.visible is card.figures.visible is False  # no ledger is there
