@@ -2618,3 +2618,61 @@ def test_each_of_several_keys_of_one_end_is_explained_in_the_data(call, key, nam
     data = json.loads(call("explain", "--json", key).out)
     assert [each["name"] for each in data] == names
     assert data == json.loads(json.dumps([asdict(each) for each in explained(key)]))
+
+
+READING = {
+    "run": ("run", "{}"),
+    "reproduce": ("reproduce", "{}"),
+    "budget": ("budget", "{}"),
+    "contacts": ("contacts", "{}"),
+    "constellation": ("constellation", "{}"),
+    "design": ("design", "{}"),
+    "pointing": ("pointing", "{}"),
+    "worst-case": ("worst-case", "{}"),
+    "jitter": ("jitter", "{}", "a.csv"),
+    "bench": ("bench", "{}"),
+    "identify": ("identify", "{}", "--input", "0", "--output", "1"),
+    "import": (
+        *("import", "{}", "--travel", "2.5 mrad", "--drive", "0 V", "12 V", "--bias", "6 V"),
+        *("--rate-limit", "3770 V/s", "--band", "1 Hz", "5 kHz", "--normalise-at", "2 Hz", "--output-unit", "mrad"),
+    ),
+    "export c": ("export", "c", "{}"),
+    "export fmu": ("export", "fmu", "{}"),
+    "export matrices": ("export", "matrices", "{}"),
+    "campaign run": ("campaign", "run", "{}"),
+    "campaign resume": ("campaign", "resume", "{}"),
+    "campaign status": ("campaign", "status", "{}"),
+    "campaign verify": ("campaign", "verify", "{}"),
+    "campaign export": ("campaign", "export", "{}", "rows.csv"),
+    "campaign report": ("campaign", "report", "{}", "p.html"),
+    "campaign optimise": ("campaign", "optimise", "{}"),
+}
+
+
+def test_each_command_that_reads_a_file_is_among_those_below():
+    def commands(group, begin=()):
+        for name, each in group.commands.items():
+            if hasattr(each, "commands"):
+                yield from commands(each, (*begin, name))
+            elif any(part.param_type_name == "argument" for part in each.params):
+                yield " ".join((*begin, name))
+
+    others = {"init", "campaign init", "explain", "studio"}  # which write a file, take a key, and open a page
+    assert set(commands(typer.main.get_command(cli.app))) - others == set(READING)
+
+
+@pytest.mark.parametrize("kind", ["missing", "binary", "empty"])
+@pytest.mark.parametrize("command", READING)
+def test_a_file_that_is_missing_or_none_of_its_kind_is_named_by_every_command(refused, folder, command, kind):
+    name = "my file.csv" if command == "identify" else "my file.mat" if command == "import" else "my file.toml"
+    if kind != "missing":
+        (folder / name).write_bytes(b"" if kind == "empty" else bytes(range(256)) * 10)
+    said = refused(*(part.format(name) for part in READING[command]))
+    assert said.startswith("microrad: ") and name in said
+
+
+@pytest.mark.parametrize("command", [each for each in READING if each not in ("identify", "reproduce")])
+def test_a_folder_in_the_place_of_a_file_is_named_by_every_command_that_takes_none(refused, folder, command):
+    (folder / "my folder.toml").mkdir()
+    said = refused(*(part.format("my folder.toml") for part in READING[command]))
+    assert said.startswith("microrad: ") and "my folder.toml" in said

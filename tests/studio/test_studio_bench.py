@@ -1661,3 +1661,14 @@ def test_a_controller_that_is_not_tuned_yet_has_a_row_that_says_why_beside_those
 )
 def test_what_is_no_outcome_of_an_identification_is_none(said):
     assert mirror_view.outcome(said) is None
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize("typed", ["0.99 nrad", "0 urad", "-5 urad", "101 mrad", "1 rad"])
+def test_step_and_amplitude_each_have_both_their_bounds(place, typed):
+    given = ["1 urad", "1 urad", "1 Hz"]
+    given[place] = typed
+    name = ("step", "amplitude of the sine")[place]
+    with pytest.raises(control_view.AskError) as refusal:
+        control_view.ask_of(*given, 30e3)
+    assert str(refusal.value) == f"{name}: {typed} is outside 1 nrad to 100 mrad; type one between"

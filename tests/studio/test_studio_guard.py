@@ -1312,3 +1312,12 @@ def test_who_is_locked_out_or_sends_too_much_is_told_in_whole_sentences_what_to_
             "every n-th sample, or run microrad identify on the file, which needs no upload.",
             ((b"connection", b"close"),),
         )
+
+
+@pytest.mark.parametrize(
+    ("hosts", "pages"), [((HOST, HOST), (PAGE,)), ((HOST, HOST, HOST), (PAGE, PAGE)), ((HOST,), (PAGE, PAGE, PAGE))]
+)
+def test_a_guard_has_an_origin_for_each_host_and_none_to_spare(hosts, pages):
+    with pytest.raises(ValueError, match="the guard needs hosts, their origins and a token"):
+        Guard(Inner(), hosts, pages, TOKEN)
+    assert Guard(Inner(), (HOST, HOST), (PAGE, PAGE), TOKEN).limits == Limits()
