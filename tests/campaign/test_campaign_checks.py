@@ -1389,3 +1389,12 @@ def test_drawn_switches_and_lists_are_told_as_the_file_has_them():
 def test_a_limit_whose_ends_are_the_same_is_no_range(least, most, said):
     found = noted(checks.limit, "residual_rms", {"least": least, "most": most}, ["residual_rms"])
     assert found.startswith(said)
+
+
+@pytest.mark.parametrize("weights", [[1], [1, 2, 3], [], [1, -2], [0, 1], [1, True], [1, "2"], 3, "1, 2"])
+def test_weights_are_as_many_as_the_values_and_each_above_nothing(weights):
+    key, listed = "communication.transmit_power", {"distribution": "table", "values": ["5 W", "6 W"]}
+    found = drawn(key, {**listed, "weights": weights})
+    assert found.startswith(f"inputs.{key}.weights = ")
+    assert " does not give each value its weight: 2 plain numbers above 0, one for each value ()" in found
+    assert "inputs." not in drawn(key, {**listed, "weights": [1, 3]})

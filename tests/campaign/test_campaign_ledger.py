@@ -1393,3 +1393,11 @@ def test_a_ledger_of_an_older_format_is_refused_as_that_of_a_newer_one_is(path, 
         assert said(Ledger.open, path, write=write) == (
             f"{path} is a ledger of format {version}, and this microrad knows 1: use the microrad that began it"
         )
+
+
+def test_a_chunk_is_no_trace_and_a_trace_no_chunk():
+    for given, wanted, unpacked in (
+        ("chunk", "trace", lambda: chunk_format.unpack_trace(packed(0))),
+        ("trace", "chunk", lambda: chunk_format.unpack_chunk(chunk_format.pack_trace(TRACE))),
+    ):
+        assert said(unpacked).startswith(f"these bytes are a {given}, not a {wanted}: the worker runs another microrad")
