@@ -2676,3 +2676,46 @@ def test_a_folder_in_the_place_of_a_file_is_named_by_every_command_that_takes_no
     (folder / "my folder.toml").mkdir()
     said = refused(*(part.format("my folder.toml") for part in READING[command]))
     assert said.startswith("microrad: ") and "my folder.toml" in said
+
+
+WITH_MIRROR = {
+    "run": ("run",),
+    "design": ("design",),
+    "worst-case": ("worst-case",),
+    "export c": ("export", "c"),
+    "export fmu": ("export", "fmu"),
+    "export matrices": ("export", "matrices"),
+}
+
+
+def test_each_command_that_takes_a_mirror_file_is_among_those_below():
+    def commands(group, begin=()):
+        for name, each in group.commands.items():
+            if hasattr(each, "commands"):
+                yield from commands(each, (*begin, name))
+            elif any("--mirror" in part.opts for part in each.params):
+                yield " ".join((*begin, name))
+
+    assert set(commands(typer.main.get_command(cli.app))) == set(WITH_MIRROR)
+
+
+@pytest.mark.parametrize("kind", ["missing", "binary", "folder", "of nothing"])
+@pytest.mark.parametrize("command", WITH_MIRROR)
+def test_a_mirror_file_that_is_none_is_named_by_every_command_that_takes_one(refused, folder, command, kind):
+    mirror = folder / "my mirror.toml"
+    if kind == "folder":
+        mirror.mkdir()
+    elif kind != "missing":
+        mirror.write_bytes(bytes(range(256)) if kind == "binary" else b"[nothing]\n")
+    said = refused(*WITH_MIRROR[command], PAPER, "--mirror", "my mirror.toml")
+    assert said.startswith("microrad: ") and "my mirror.toml" in said
+
+
+@pytest.mark.parametrize("command", [("jitter", PAPER, "{}"), ("pointing", PAPER, "--sources", "{}")])
+@pytest.mark.parametrize("kind", ["missing", "empty", "binary"])
+def test_a_second_file_of_a_command_is_named_where_it_cannot_be_read(refused, folder, command, kind):
+    *rest, name = (str(part).format("my list.csv") for part in command)
+    if kind != "missing":
+        (folder / name).write_bytes(b"" if kind == "empty" else bytes(range(256)) * 10)
+    said = refused(*rest, name)
+    assert said.startswith("microrad: ") and name in said
