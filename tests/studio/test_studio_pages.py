@@ -50,6 +50,7 @@ from microrad.studio.pages import (
     link,
     mirror,
     mirror_job,
+    mission,
     pointing,
     runs,
     runs_jobs,
@@ -3148,3 +3149,26 @@ def test_every_state_of_every_kind_of_job_has_its_colour_and_its_buttons(session
     assert (card.cancel.visible, card.drop.visible, card.bar.visible) == (not over, over, state == "running")
     assert ("open" in card.details.props) is (kind in ("study", "export"))
     assert card.again.visible is card.page.visible is card.figures.visible is False  # no ledger is there
+
+
+@pytest.mark.parametrize("python", [False, True])
+@pytest.mark.parametrize(
+    ("module", "command"),
+    [
+        (mission, "budget"),
+        (control, "design"),
+        (day, "contacts"),
+        (link, "budget"),
+        (pointing, "budget"),
+        (compare, "budget"),
+    ],
+    ids=lambda each: getattr(each, "TITLE", each),
+)
+def test_each_page_copies_the_command_that_computes_what_it_shows(inner, tab, monkeypatch, module, command, python):
+    copied = []
+
+    monkeypatch.setattr(layout, "_copy", lambda action, python: copied.append((action, python)))
+    module.page(inner)
+    words = "Copy as Python" if python else "Copy as command"
+    press(next(each for each in tab.content.descendants() if getattr(each, "text", "") == words))
+    assert copied == [(getattr(commands, command)(Path("sub/m n.toml")), python)]
