@@ -720,3 +720,16 @@ def test_a_controller_of_fewer_axes_than_its_loop_is_refused_as_one_of_more_is()
         said = f"controller 'PID' has {axes} inputs, {axes} outputs and an anti-windup of shape \\({axes}, {axes}\\)"
         with pytest.raises(ValueError, match=f"^{said}: a loop of 2 axes takes an error and gives a command for each"):
             two.margins(Controller.pid(0.0, 1e6, rate_hz=10e3, axes=axes))
+
+
+@pytest.mark.parametrize("wanted", [[0.0, math.inf], [-math.inf, 0.0], np.full((3, 2), 1e-6), np.zeros((0, 1))])
+def test_a_reference_without_an_end_or_of_another_shape_is_refused(wanted):
+    said = re.escape(f"reference_rad has shape {np.shape(wanted)}: give finite samples of shape (samples, 1)")
+    with pytest.raises(ValueError, match=said):
+        LOOP.simulate(SLOW, 0.1, reference_rad=wanted)
+
+
+@pytest.mark.parametrize("runs", [0, -1])
+def test_runs_are_one_at_least(runs):
+    with pytest.raises(ValueError, match=f"^an ensemble of {runs} runs has no statistics: ask for 1 run or more$"):
+        LOOP.ensemble(SLOW, runs, 0.1)
