@@ -2081,3 +2081,11 @@ def test_states_before_and_behind_the_days_of_trust_are_each_refused(tmp_path):
     for time_s, words in ((first_s - 1.0, "not valid yet"), (last_s + 1.0, "expired")):
         with pytest.raises(OrbitError, match=f"the elements are {words}: "):
             orbit.states(np.array([0.0, time_s]))
+
+
+@pytest.mark.parametrize("key", ["CCSDS_OPM_VERS", "CCSDS_AEM_VERS", "ORIGINATOR"])
+@pytest.mark.parametrize("version", ["1.0", "2.0", "3.0"])
+def test_a_message_of_another_kind_is_no_ephemeris_whatever_its_version(tmp_path, key, version):
+    text = HEAD.replace("CCSDS_OEM_VERS = 2.0", f"{key} = {version}") + segment(GRID)
+    no_ephemeris(tmp_path, text, f"line 1: the file begins with {key} = '{version}', not with CCSDS_OEM_VERS = 1, 2 or")
+    ephemeris(tmp_path, HEAD.replace("2.0", version) + segment(GRID))
