@@ -829,6 +829,8 @@ def test_recordings_of_one_drive_have_the_same_sensors_and_each_its_own_data(tmp
     assert refusal(tmp_path, f'{common}{second}["x", "y"]') == (
         f"{path}: {b}: the same data as {a}; give each recording once, and for validation one that is not fitted."
     )
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [

@@ -390,6 +390,8 @@ def test_the_noisiest_of_two_drives_is_told_in_either_order():
 )
 def test_a_sweep_of_a_step_or_two_goes_from_its_first_sample_to_its_last(sweep, fastest):
     assert records._fastest_tenth(np.array(sweep)) == fastest
+
+
 @pytest.mark.parametrize("arm", [0.0, -0.5, math.inf, -math.inf, math.nan])
 @pytest.mark.parametrize("unit", ["mm", "urad"])
 def test_a_lever_arm_is_a_length_above_nothing_with_an_end(unit, arm):

@@ -811,6 +811,8 @@ def test_a_stage_that_never_ends_has_no_longest_time():
     assert (never.time_s.size, stage.longest_s) == (0, 0.0)
     ends = replace(CHAIN[0], duration_s=merged(np.array([0.7, 0.3]), np.array([0.25, 0.5])))
     assert ends.longest_s == 0.7
+
+
 @pytest.mark.parametrize("threshold", [math.inf, -math.inf, math.nan])
 def test_a_threshold_without_an_end_is_refused(threshold):
     with pytest.raises(ValueError, match=f"^the threshold is {threshold:g} times the noise: it must be finite$"):

@@ -245,6 +245,8 @@ def test_power_that_just_has_the_margin_is_not_below_it():
     error[7, 1] = 20e-6
     found = in_slices(code_words._Lost(FadeMargin(Light(63e-6, 0.0), 0.0), 5), error, 8)
     assert_allclose(found, [[1 / 3] * 3, [1 / 15] * 3], rtol=1e-12)
+
+
 def test_a_code_word_is_two_control_samples_at_least_and_as_long_as_a_run_at_most():
     for word_s in (0.0016, 0.002, 3.0, 3.0004):
         assert words_asked(MARGIN, word_s, LOOP.parts, SPAN) is not None

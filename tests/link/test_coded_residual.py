@@ -177,6 +177,8 @@ def test_the_target_of_a_coded_beam_is_that_of_its_receiver_or_without_one_that_
     file = link_file(tmp_path, alone, receiver, {"communication.fading": table})
     found = CodedBeam.of(link.of(file.mission))
     assert (found.target, found.interleaving, found.span_s) == (target, "block", pytest.approx(5e-3))
+
+
 def test_an_interleaver_that_spans_just_a_run_is_taken():
     def asked(span_s):
         return coded_asked(CodedBeam(Light(100e-6, 5e-6), 3.0, CODE, 1e-5, "block", span_s), LOOP.parts, SPAN)

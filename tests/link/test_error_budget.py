@@ -1536,6 +1536,8 @@ def test_a_refusal_of_a_requirement_has_six_digits_of_a_number_that_has_more(cal
     with pytest.raises(ValueError) as refused:
         call()
     assert str(refused.value) == said
+
+
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize(
     ("kind", "name", "rest"),

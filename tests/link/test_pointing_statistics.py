@@ -658,6 +658,8 @@ def test_fades_of_both_ends_that_never_begin_last_for_ever_or_are_not_there(marg
     found = pf.fades_of_both(*ends, margin_db)
     assert (float(found.per_second), float(found.mean_duration_s)) == (0.0, lasting_s)
     assert float(found.share_of_time) > 0.9 if lasting_s else float(found.share_of_time) == 0.0
+
+
 @pytest.mark.parametrize(
     "curve",
     [

@@ -1211,6 +1211,8 @@ def test_a_refusal_of_a_phase_error_has_six_digits_of_numbers_that_have_more(rat
     start = f"QpskHeterodyne.phase_error_rad is 0.333333 rad: no power reaches a bit error ratio of {shown} above "
     assert said.startswith(start) and said.endswith(" rad rms")
     assert 0.05 < float(said.removeprefix(start).split()[0]) < 0.2
+
+
 @pytest.mark.parametrize("order", [2, 4, 1024])
 def test_a_symbol_of_two_slots_is_the_shortest(order):
     assert replace(PPM, order=order).order == order

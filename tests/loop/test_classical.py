@@ -672,6 +672,8 @@ def test_an_observer_undoes_a_resonance_that_stands_out_and_leaves_one_that_hard
         respond(found, 900.0)[0, 0, 0] / respond(classical.observer_filter(PLAIN, 400.0, 800.0, 1.0), 900.0)[0, 0, 0]
     )
     assert abs(ratio) < 2.5 * damping if order == 4 else abs(ratio) == pytest.approx(1.0, rel=1e-6)
+
+
 @each_design
 def test_a_value_too_many_or_without_an_end_is_refused(family, plant, values):
     wanted = len(values)

@@ -1662,6 +1662,9 @@ def test_an_input_that_drives_nothing_takes_no_random_numbers(step_s):
         still = replace(given, B=inputs, lines=())
         assert (still.variance_rad2, discretise(still, step_s).Bd.shape) == (0.0, (2, 0))
         assert not psd(still, np.array([0.1, 1.0])).any()
+
+
+@pytest.mark.parametrize(
     ("build", "message"),
     [
         (

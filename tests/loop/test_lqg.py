@@ -519,6 +519,8 @@ def test_what_is_used_in_the_end_has_coarser_numbers_than_what_a_search_looks_at
     off = [np.max(np.abs(gain / lti.to_bits(gain, 24) - 1.0)) for gain in gains]
     assert off[0] > 1e-9 > off[1]
     assert used.anti_windup.tolist() == smooth.anti_windup.tolist()
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

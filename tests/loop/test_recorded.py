@@ -931,6 +931,8 @@ def test_drift_is_the_reason_where_it_makes_more_than_half_of_what_is_left_beyon
     assert (span.duration_s, span.settle_s, span.seed) == (pytest.approx(0.399), pytest.approx(0.05), 0)
     assert found.beyond_loop_rad == 0.0
     assert asked == [((),), ((KNOWN,),)]
+
+
 @pytest.mark.parametrize("step_s", [9.9e-8, 10.1])
 def test_a_recording_is_played_neither_ten_thousand_times_faster_nor_slower(step_s):
     motion = recorded_motion(MOVING, 1e-3, "tracker")

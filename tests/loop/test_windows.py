@@ -530,6 +530,9 @@ def test_a_refusal_names_the_index_that_was_asked_for_and_each_value_of_a_densit
     with pytest.raises(ValueError) as refused:
         call()
     assert str(refused.value) == words
+
+
+@pytest.mark.parametrize(
     ("freq_hz", "density"),
     [
         ([1.0, 2.0], [1.0, 1.0, 1.0]),

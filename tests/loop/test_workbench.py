@@ -642,6 +642,8 @@ def test_a_number_of_a_loop_that_is_not_above_0_is_refused_by_its_name(name, val
         replace(LOOP, **{name: value})
     assert str(refused.value) == f"{name} of a loop is {value}: give a number above 0"
     assert replace(LOOP, amplifier_bandwidth_hz=math.inf, slew_v_s=math.inf).axes == 1
+
+
 @pytest.mark.parametrize("rate_hz", [20e3, 10e3 * (1 + 1e-8), 5e3, 10e3 * (1 - 1e-8)])
 def test_a_controller_of_a_faster_or_a_slower_rate_is_refused(rate_hz):
     with pytest.raises(ValueError, match=r"^controller 'PID' is made for .* Hz, and this loop has 10000 Hz: make one"):
