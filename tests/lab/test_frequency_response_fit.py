@@ -1000,3 +1000,74 @@ def test_the_largest_of_several_orders_has_to_have_fewer_numbers_than_the_table(
         "a model of order 9 has 20 numbers, and 10 frequencies give 20 real values; give more frequencies or a lower "
         "order."
     )
+
+
+def limited_table(error):
+    """Of 64 rows, a model of order 3 of two outputs and one drive has 11 numbers: 53 are left."""
+    return response_table.ResponseTable(
+        np.arange(3.0, 19.0), np.ones((16, 2, 1)) + 0j, error, "band-limited", None, True
+    )
+
+
+FREEDOM = 53.0
+
+
+@pytest.mark.parametrize(
+    ("error", "cost", "answers", "kept", "asked"),
+    [
+        (None, 1e9, ["a"], "own", 0),
+        (0.1, FREEDOM + 3.0 * np.sqrt(2.0 * FREEDOM) - 1e-6, ["a"], "own", 0),
+        (0.1, FREEDOM + 3.0 * np.sqrt(2.0 * FREEDOM) + 1e-6, [None], "own", 1),
+        (0.1, 900.0, ["a", "b", None, "c"], "b", 3),
+        (0.1, 900.0, [f"{k}" for k in range(20)], "11", 12),
+    ],
+)
+def test_modes_are_exchanged_as_long_as_that_helps_where_more_is_left_than_the_known_noise(
+    monkeypatch, error, cost, answers, kept, asked
+):
+    heard, left = [], list(answers)
+    monkeypatch.setattr(frequency_fit, "exchanged", lambda *given: heard.append(given) or left.pop(0))
+    own = polished_of(cost, rows=64, model=SimpleNamespace(order=3))
+    found = frequency_fit._Found("equations", own, 2e-3)
+    best = frequency_fit._improved(limited_table(error), found)
+    assert best == ("equations", own if kept == "own" else kept, 2e-3)
+    assert heard == [("equations", now, (3.0, 18.0)) for now in [own, *answers][:asked]]
+
+
+@pytest.mark.parametrize(
+    ("cost", "outputs", "inputs", "order", "other"),
+    [
+        (601.0, 2, 3, 5, 3),
+        (601.0, 3, 2, 2, 1),
+        (601.0, 3, 3, 7, 3),
+        (599.0, 2, 3, 5, None),
+        (601.0, 1, 3, 5, None),
+        (601.0, 3, 1, 5, None),
+        (601.0, 3, 3, 2, None),
+    ],
+)
+@pytest.mark.parametrize("again", [500.0, 700.0])
+def test_a_start_that_lacks_something_has_a_second_one_of_fewer_poles_of_full_rank(
+    monkeypatch, cost, outputs, inputs, order, other, again
+):
+    """The vector fit leaves 2 in each of 100 rows, of half a square each: 1.5 times that is 300, and 600 with 4."""
+    sketched_with = []
+    equations = SimpleNamespace(response=np.zeros((50, outputs, inputs)), rows=100)
+
+    def sketch(table, response, own, poles):
+        assert response is equations.response and own is equations
+        sketched_with.append(poles)
+        return SimpleNamespace(rms_error=2.0 * np.sqrt(2.0), modes=lambda: ("modes", poles))
+
+    monkeypatch.setattr(frequency_fit, "_sketch", sketch)
+    monkeypatch.setattr(frequency_fit, "_start", lambda own, found, poles: ("start", poles))
+    monkeypatch.setattr(frequency_fit, "reduced", lambda modes, poles: ("reduced", modes, poles))
+    monkeypatch.setattr(frequency_fit, "_fitted_outputs", lambda own, model: (model, 0.0))
+    costs = {"start": cost, "reduced": again}
+    monkeypatch.setattr(frequency_fit, "_from", lambda own, start: SimpleNamespace(cost=costs[start[0]], start=start))
+    best = frequency_fit._polished("table", equations, order)
+    if other is None:
+        assert sketched_with == [order] and best.start == ("start", order)
+    else:
+        assert sketched_with == [order, other]
+        assert best.start == (("reduced", ("modes", other), order) if again < cost else ("start", order))

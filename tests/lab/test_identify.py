@@ -1812,3 +1812,48 @@ def test_plays_are_correlated_over_what_was_fitted_alone():
     assert again == numbers
     assert_allclose(same, found, rtol=1e-9)
     assert np.abs(covariance((one, 20, 400), (two, 30, 300))[1] - found).max() > 1e-14
+@pytest.mark.parametrize("d1", [4.0, -4.0])
+def test_the_share_of_a_bound_is_lowered_by_what_the_lowest_slope_lacks_until_it_is_within_its_tolerance(
+    monkeypatch, d1
+):
+    """The slopes are -2, -10 and -0.0006 of d1, then one within half a thousandth."""
+    slopes, searched = [-8.0, -40.0, -2.4e-3, -1.6e-3], []
+
+    def search(problem, start):
+        searched.append((problem.share, start))
+        return SimpleNamespace(x=start + 1)
+
+    monkeypatch.setattr(bouc_wen_of, "lowest_slope", lambda problem, values: slopes.pop(0))
+    monkeypatch.setattr(bouc_wen_of, "_search", search)
+    problem = SimpleNamespace(share=0.9, solve=lambda best: np.array([d1, best, 7.0]))
+    found, best = bouc_wen_of.with_tightened_bound(problem, 100)
+    assert found is problem and best == 103 and slopes == []
+    shares = np.cumprod([0.9, 0.995 / 3.0, 0.3, 0.995 / 1.0006])[1:]
+    assert [start for _, start in searched] == [100, 101, 102]
+    assert [share for share, _ in searched] == pytest.approx(shares)
+
+
+def test_the_best_of_the_starts_on_fewer_samples_is_polished_on_all_of_them(monkeypatch):
+    """The second of three starts comes to the least cost; it is no better than the others before its search."""
+    asked, told = [], []
+
+    def search(problem, start):
+        asked.append((problem, start))
+        return SimpleNamespace(x=start + 0.5, cost={1.0: 3.0, 2.0: 0.25, 3.0: 4.0}.get(start, 0.125))
+
+    monkeypatch.setattr(bouc_wen_of, "_thin_problem", lambda problem: f"thin {problem}")
+    monkeypatch.setattr(
+        bouc_wen_of, "_starts", lambda problem, starts, seed: asked.append((problem, starts, seed)) or [1.0, 2.0, 3.0]
+    )
+    monkeypatch.setattr(bouc_wen_of, "_search", search)
+    costs, best = bouc_wen_of.search_from_starts("all", 3, 17, lambda *args: told.append(args))
+    assert costs.tolist() == [3.0, 0.25, 4.0] and best == 3.0
+    assert asked == [("thin all", 3, 17), *(("thin all", start) for start in (1.0, 2.0, 3.0)), ("all", 2.5)]
+    assert told == [(done, 3, "Bouc-Wen starts") for done in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("starts", [0, -2])
+def test_a_fit_without_a_start_is_refused_before_its_recordings_are_looked_at(starts):
+    with pytest.raises(IdentificationError) as refused:
+        fit_bouc_wen([], starts=starts)
+    assert str(refused.value) == f"{starts} starts were asked for; give at least 1, better 10 or more."

@@ -1102,3 +1102,103 @@ def test_the_fit_of_records_of_unlike_length_is_about_the_mean_of_each():
     np.testing.assert_allclose(found.fit_percent, [75.0, 50.0], rtol=1e-12)
     squares = sum(np.sum(e**2, axis=0) for e in errors)
     np.testing.assert_allclose(found.residual_rms, np.sqrt(squares / 110), rtol=1e-12)
+
+
+@pytest.mark.parametrize("steady", [True, False])
+def test_the_share_of_a_mode_is_the_largest_of_all_outputs_over_all_records_beside_what_is_left_there(steady):
+    """Three outputs of two drives: the mode is the second of three, the direct term and the others do not count."""
+    draw = philox(12).standard_normal
+    poles = np.array([-40.0 + 0j, -5 + 130j, -9 + 300j])
+    b, c = draw((3, 2)) + 1j * draw((3, 2)), draw((3, 3)) + 1j * draw((3, 3))
+    b[0], c[:, 0] = b[0].real, c[:, 0].real
+    model = ModalModel(poles, b, c, draw((3, 2)))
+    drives = [draw((size, 2)) for size in (60, 90)]
+    records = [recording(drive, np.zeros((len(drive), 3)), 200.0, 30 if steady else None) for drive in drives]
+    alone = ModalModel(poles[1:2], b[1:2], c[:, 1:2], np.zeros((3, 2)))
+    parts = []
+    for drive in drives:
+        if steady:
+            own = [simulate_periodic(alone, drive[k : k + 30], 200.0) for k in range(0, len(drive), 30)]
+        else:
+            own = [simulate(alone, drive - drive[0], 200.0)]
+        parts += own
+    size = np.concatenate(parts).std(axis=0)
+    for left in ([1.0, 2.0, 4.0], [0.01, 5.0, 5.0], [9.0, 9.0, 0.02]):
+        share = fit_module._mode_share(model, 1, records, "zero-order", np.array(left))
+        assert share == pytest.approx(max(s / own for s, own in zip(size, left, strict=True)), rel=1e-9)
+
+
+def test_more_poles_than_lines_are_not_tried_where_modes_are_exchanged():
+    """Twelve lines fix eleven poles at most, and 1.4 times nine are thirteen."""
+    truth = order_modes(
+        2 * np.pi * np.array([-9.0 + 0j, 40.0 * (-0.05 + 1j), 110.0 * (-0.03 + 1j)]),
+        np.array([[1.0, -1.0], [1.0, 2.0], [2.0, 1.0j]]) + 0j,
+        np.array([[30.0, 20.0, 5.0], [-10.0, 9.0, 30.0]]) + 0j,
+        np.zeros((2, 2)),
+    )
+    response = response_from_periods(multisines(truth, noise=0.01))
+    kept = np.linspace(0, response.freq_hz.size - 1, 12).astype(int)
+    arrays = ("freq_hz", "response", "standard_error", "drive_power", "coherence", "residual_power")
+    few = replace(
+        response,
+        noise_standard_error=None,
+        distortion_standard_error=None,
+        **{name: getattr(response, name)[kept] for name in arrays},
+    )
+    found = fit_order(few, 9, exchanges=1, fine=False)
+    assert found.model.order == 9 and (found.model.poles_rad_s.real < 0).all()
+
+
+@pytest.mark.parametrize(
+    ("trials", "polished", "expected"),
+    [
+        ({(1, "c"): 9.0, (1, "e"): 8.0, (2, "c"): 7.0, (2, "e"): 9.5}, 6.0, "best"),
+        ({(1, "c"): 9.0, (1, "e"): 8.0, (2, "c"): 9.5, (2, "e"): 10.499}, 9.9, "best"),
+        ({(1, "c"): 9.0, (1, "e"): 8.0, (2, "c"): 9.5, (2, "e"): 12.0}, 9.995, None),
+        ({(1, "c"): 10.6, (1, "e"): 11.0, (2, "c"): 12.0, (2, "e"): 10.51}, 1.0, None),
+    ],
+)
+def test_the_best_of_two_unlike_candidates_beside_each_removal_is_polished_and_taken_where_it_helps(
+    monkeypatch, trials, polished, expected
+):
+    """Of four candidates the second is as good as the first one's own pole, and the fourth is not tried any more."""
+    marks = {"c": -1 + 100j, "d": -1 + 119j, "e": -1 + 130j, "f": -1 + 900j}
+    seen, asked = [], []
+
+    def fitted(equations, poles, inputs):
+        asked.append((poles[0].real, inputs))
+        return SimpleNamespace(direct=np.zeros((3, 2)), of=poles[0].real), None
+
+    def candidates(equations, rest, band):
+        assert equations == "equations" and band == (1.0, 50.0)
+        return [order.CandidateMode(1.0, pole, np.full(2, rest.of)) for pole in marks.values()]
+
+    def made(poles, inputs, outputs, direct):
+        assert inputs.shape == (2, 2) and outputs.shape == (3, 2) and direct.shape == (3, 2)
+        assert inputs[-1].tolist() == [poles[0].real] * 2
+        mark = next(name for name, pole in marks.items() if pole == poles[-1])
+        return (int(-poles[0].real), mark)
+
+    def polish_of(equations, model, iterations, tolerance):
+        seen.append((model, iterations, tolerance))
+        return SimpleNamespace(model=model, cost=trials[model] if iterations == 12 else polished)
+
+    monkeypatch.setattr(
+        order,
+        "_without_weakest",
+        lambda equations, model: [
+            (np.array([-1.0 + 0j]), np.full((1, 2), 7.0)),
+            (np.array([-2.0 + 0j]), np.full((1, 2), 8.0)),
+        ],
+    )
+    monkeypatch.setattr(order, "fit_outputs", fitted)
+    monkeypatch.setattr(order, "_candidates", candidates)
+    monkeypatch.setattr(order, "order_modes", made)
+    monkeypatch.setattr(order, "polish", polish_of)
+    found = order.exchanged("equations", SimpleNamespace(model="now", cost=10.0), (1.0, 50.0))
+    assert [model for model, iterations, _ in seen if iterations == 12] == [(1, "c"), (1, "e"), (2, "c"), (2, "e")]
+    least = min(trials, key=trials.get)
+    assert seen[4:] == ([] if trials[least] > 10.5 else [(least, 40, 3e-5)])
+    assert (found is None) is (expected is None)
+    if found:
+        assert (found.model, found.cost) == (least, polished)

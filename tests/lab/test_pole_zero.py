@@ -755,3 +755,26 @@ def test_a_pole_is_shown_by_a_period_of_what_repeats_and_else_by_a_whole_record(
     assert lags == axis._lags(expected)
     assert_allclose(response.freq_hz, expected.freq_hz)
     assert_allclose(response.response, expected.response)
+
+
+@pytest.mark.parametrize(("gain", "taken"), [(0.0009, False), (0.0011, True)])
+def test_the_best_of_the_four_most_promising_changes_is_made_where_it_lowers_the_criterion(monkeypatch, gain, taken):
+    """Of six changes, the worst first, the last four are fitted to their end, and there another one is the best.
+
+    The first two would be better still in the end, but their rough fits are the worst.
+    """
+    rough = {"a": 60.0, "b": 50.0, "c": 40.0, "d": 30.0, "e": 20.0, "f": 10.0}
+    settled = {"a": 0.0, "b": 0.0, "c": 7.0, "d": 5.0 - gain, "e": 6.0, "f": 8.0}
+    asked = []
+
+    class Problem:
+        def fitted(self, start, evaluations=None):
+            asked.append((start, evaluations))
+            own = rough if evaluations is not None else settled
+            return SimpleNamespace(problem=self, at=start, criterion=own[start])
+
+    begin = SimpleNamespace(problem=Problem(), at="begin", criterion=5.0)
+    monkeypatch.setattr(pole_zero, "_others", lambda fit: list(rough) if fit.at == "begin" else [])
+    left = pole_zero.pruned(begin)
+    assert (left.at == "d") is taken and (left is begin) is not taken
+    assert asked == [*((one, 4) for one in "abcdef"), *((one, None) for one in "fedc")]

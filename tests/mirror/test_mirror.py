@@ -1328,3 +1328,20 @@ def test_a_mirror_whose_poles_cannot_be_told_apart_is_refused_with_its_file():
         "the linear part of the mirror: poles nearly coincide: the transfer function has no accurate modal form; give "
         "poles and pole_dampings in place of numerator and denominator"
     )
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom", "message"),
+    [
+        ([1e30], [1e-125, 1.0], "the denominator of mirror 'm' begins with 1e-125, nothing beside the others"),
+        (
+            [1.0, 1e-300],
+            [1.0, 3.0, 2.0],
+            "the linear part of mirror 'm' has a gain at rest of 0: look at its coefficients",
+        ),
+    ],
+)
+def test_a_numerator_too_large_for_its_denominator_or_with_no_gain_at_rest_is_refused(top, bottom, message):
+    with pytest.raises(ValueError) as refused:
+        Mirror.of(PLAYS, top, bottom, name="m")
+    assert str(refused.value) == message
