@@ -2,6 +2,7 @@
 
 import math
 import os
+from collections import namedtuple
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from scipy.signal import lfilter
 from microrad.core import lti
 from microrad.lab.identify.linear import amplitude, axis, order
 from microrad.lab.identify.linear import fit as fit_module
+from microrad.lab.identify.linear import polish as polish_of
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import (
     choose,
@@ -1128,8 +1130,9 @@ def test_the_share_of_a_mode_is_the_largest_of_all_outputs_over_all_records_besi
         assert share == pytest.approx(max(s / own for s, own in zip(size, left, strict=True)), rel=1e-9)
 
 
-def test_more_poles_than_lines_are_not_tried_where_modes_are_exchanged():
+def test_more_poles_than_lines_are_not_tried_where_modes_are_exchanged(monkeypatch):
     """Twelve lines fix eleven poles at most, and 1.4 times nine are thirteen."""
+    monkeypatch.setattr(order, "exchanged", lambda *given: None)
     truth = order_modes(
         2 * np.pi * np.array([-9.0 + 0j, 40.0 * (-0.05 + 1j), 110.0 * (-0.03 + 1j)]),
         np.array([[1.0, -1.0], [1.0, 2.0], [2.0, 1.0j]]) + 0j,
@@ -1202,3 +1205,123 @@ def test_the_best_of_two_unlike_candidates_beside_each_removal_is_polished_and_t
     assert (found is None) is (expected is None)
     if found:
         assert (found.model, found.cost) == (least, polished)
+
+
+def polished_by(monkeypatch, trials, promised=(), **words):
+    """What a search makes of trials that come to these costs (None: no lower one), and the dampings it asks for."""
+    trials, promised, costs, asked = list(trials), list(promised), {}, []
+
+    def tried(equations, model, state, damping):
+        assert state == (("normal of", model), "gradient", costs.get(model, 100.0))
+        asked.append(damping)
+        cost = trials.pop(0)
+        if cost is None:
+            return None
+        costs[("even", f"trial {len(asked)}")] = cost
+        return f"trial {len(asked)}", cost
+
+    monkeypatch.setattr(polish_of, "_trial", tried)
+    monkeypatch.setattr(polish_of, "_balanced", lambda model: ("even", model))
+    monkeypatch.setattr(polish_of, "_promised", lambda normal, gradient: promised.pop(0))
+    monkeypatch.setattr(polish_of, "fit_outputs", lambda equations, poles, inputs: (f"{poles} {inputs}", 3.0))
+    monkeypatch.setattr(
+        polish_of,
+        "normal_equations",
+        lambda equations, model: (("normal of", model), "gradient", costs.get(model, 100.0)),
+    )
+    begin = namedtuple("Begin", "poles_rad_s input_vectors")("poles", "inputs")
+    found = polish(SimpleNamespace(power=1e4, rows=50), begin, **words)
+    assert trials == [] and promised == []
+    return found, asked, begin
+
+
+@pytest.mark.parametrize(
+    ("trials", "words", "last", "dampings"),
+    [
+        ([50.0, None, None, 40.0, 39.99999, 39.99998], {}, 6, [1e-3, 2e-4, 1.2e-3, 7.2e-3, 1.44e-3, 2.88e-4]),
+        ([50.0, 49.99999, 40.0, 39.99999, 39.99998], {}, 5, [1e-3 * 0.2**k for k in range(5)]),
+        ([50.0, 49.9, 49.8], {"tolerance": 0.01}, 3, [1e-3, 2e-4, 4e-5]),
+        ([50.0, 25.0], {"iterations": 2}, 2, [1e-3, 2e-4]),
+        ([2.0**-k for k in range(1, 14)], {"iterations": 13}, 13, [max(1e-3 * 0.2**k, 1e-10) for k in range(13)]),
+        ([1e-20], {}, 1, [1e-3]),
+        ([None] * 15, {}, 0, [1e-3 * 6.0**k for k in range(15)]),
+        ([], {"iterations": 0}, 0, []),
+    ],
+)
+def test_a_search_ends_with_two_small_gains_in_a_row_or_where_nothing_is_left_to_gain(
+    monkeypatch, trials, words, last, dampings
+):
+    """From a cost of 100; the damping of a step that leads nowhere is six times as large, of another a fifth."""
+    found, asked, _ = polished_by(monkeypatch, trials, **words)
+    assert asked == pytest.approx(dampings)
+    model = ("even", f"trial {last}" if last else "poles inputs")
+    assert (found.model, found.normal) == (model, ("normal of", model))
+    assert found.cost == (trials[-1] if last else 100.0) and (found.power, found.rows) == (1e4, 50)
+
+
+@pytest.mark.parametrize(
+    ("trials", "promised", "model", "normal"),
+    [
+        ([80.0, 64.0], [4.1, 3.1], "trial 2", ("even", "trial 1")),
+        ([80.0, 64.0, 63.0], [4.1, 3.3, 2.5], "trial 3", ("even", "trial 2")),
+        ([], [1.9e-4], None, None),
+        ([60.0], [2.1e-4], "trial 1", None),
+    ],
+)
+def test_a_search_that_settles_ends_with_the_step_that_promises_little_and_keeps_the_equations_before_it(
+    monkeypatch, trials, promised, model, normal
+):
+    """50 rows: of a cost of 100 a promise counts half, of 80 five eighths; the share that is settled for is 2."""
+    found, _, begin = polished_by(monkeypatch, trials, promised, settled=2.0, fitted=True)
+    assert found.model == (model or begin) and found.normal == ("normal of", normal or begin)
+    assert found.cost == (trials[-1] if trials else 100.0)
+
+
+@pytest.mark.parametrize("fine", [True, False])
+@pytest.mark.parametrize("exchanges", [0, 3])
+@pytest.mark.parametrize("smaller", [None, "smaller"])
+def test_an_order_is_the_best_of_two_starts_with_exchanges_polished_once_more_on_all_lines(
+    monkeypatch, fine, exchanges, smaller
+):
+    """Of ten poles and of fourteen: the second is worse at first and better once a mode is exchanged."""
+    lines, asked = 40, []
+    response = SimpleNamespace(
+        freq_hz=np.arange(1.0, 1.0 + lines),
+        response="response",
+        drive_power="power",
+        hold="first-order",
+        rate_hz=250.0,
+        excited_hz=(1.0, 40.0),
+    )
+    costs = {"10 poles": 5.0, "14 poles": 6.0, "14 poles +": 4.0, "14 poles ++": 3.5, "grown": 3.0}
+    merged = (np.arange(1.0, 31.0), "merged", "merged power")
+
+    def polished(equations, model, **words):
+        asked.append((equations, model, words))
+        return SimpleNamespace(model=model, cost=costs[model] - (equations[0] == "all"))
+
+    def better(equations, result, band):
+        assert equations[0] == "merged" and band == (1.0, 40.0)
+        more = f"{result.model}+" if result.model.endswith("+") else f"{result.model} +"
+        return SimpleNamespace(model=more, cost=costs[more]) if more in costs else None
+
+    def made(freq, values, power, hold, rate_hz, *, direct):
+        assert (hold, rate_hz, direct) == ("first-order", 250.0, False)
+        return {"merged": "merged", "response": "all"}[values], freq.size, power
+
+    monkeypatch.setattr(order, "_merged", lambda given: merged)
+    monkeypatch.setattr(order, "FrequencyEquations", made)
+    monkeypatch.setattr(order, "_start", lambda given, whole, orders, direct: f"{orders[1]} poles")
+    monkeypatch.setattr(order, "polish", polished)
+    monkeypatch.setattr(order, "exchanged", better)
+    monkeypatch.setattr(order, "_grown", lambda equations, model, band: "grown")
+    found = order.fit_order(response, 10, direct=False, exchanges=exchanges, fine=fine, smaller=smaller)
+    best = "14 poles ++" if exchanges else "10 poles"
+    rough, last = {"iterations": 60, "tolerance": 3e-5}, {"iterations": 40, "tolerance": 1e-6}
+    starts = ["10 poles", "14 poles"][: 1 + bool(exchanges)]
+    ends = [best, *(["grown"] if smaller else [])] if fine else []
+    assert asked == [
+        *((("merged", 30, "merged power"), start, rough) for start in starts),
+        *((("all", 40, "power"), end, last) for end in ends),
+    ]
+    assert found.model == ("grown" if fine and smaller else best)

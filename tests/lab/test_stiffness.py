@@ -1602,3 +1602,116 @@ def test_where_the_error_falls_with_the_amplitude_as_much_is_left_as_the_fit_lea
     fit.error_rms, fit.rate_hz, fit.sub_steps, fit.delay_s = 1e-6 * np.array([4.0, 2.0, 0.5]), 100.0, 1, 0.0
     drive = 9.0 * unit * np.sin(2 * np.pi * np.arange(32) / 32)[:, None]
     assert trust(fit, drive).left == pytest.approx(1e-6 * 4.0 ** (1 / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize(("lowest", "taken"), [(-0.1, 0.64), (-0.005, 0.01), (-0.7, 5.12)])
+def test_a_damping_that_is_too_small_becomes_eight_times_as_large_and_no_less(lowest, taken):
+    (factor, _), damping = search_of._factor(np.diag([1.0, lowest]), 0.01)
+    assert damping == pytest.approx(taken)
+    np.testing.assert_allclose(np.diag(factor), np.sqrt([1.0 + taken, lowest + taken]))
+
+
+def line(least=-np.inf, most=np.inf):
+    """One free number, which stands for itself."""
+    return springs_of.Springs(None, 0, np.eye(1), np.zeros(1), np.array(["phi"]), np.array([least]), np.array([most]))
+
+
+@pytest.mark.parametrize(
+    ("costs", "tried", "refusals"),
+    [
+        ([9.0], [1.0], 0),
+        ([np.inf, 9.0], [1.0, 0.5], 0),
+        ([11.0, 9.0], [1.0, 0.3], 1),
+        ([np.inf, 11.0, 9.0], [1.0, 0.5, 0.15], 1),
+        ([11.0, np.inf, 9.0], [1.0, 0.3, 0.15], 1),
+        ([11.0, 10.0], [1.0, 0.3], None),
+        ([np.inf] * 12, [0.5**k for k in range(12)], None),
+        ([10.0 - 1.9e-4, 9.0], [1.0, 0.3], 1),
+        ([10.0 - 2.1e-4], [1.0], 0),
+    ],
+)
+def test_a_step_that_costs_more_is_tried_once_more_at_three_tenths_and_one_that_runs_away_at_half(
+    monkeypatch, costs, tried, refusals
+):
+    """From 5 by -4, at a slope of 0.5: a whole step is to gain more than a ten-thousandth of the 2 that it promises."""
+    left, asked = list(costs), []
+
+    def slope(free):
+        asked.append(("slope", float(free[0])))
+        return (left.pop(0) if left and len(asked) == 1 else 77.0), np.array([3.0])
+
+    one = Search(line(), [], np.ones(0), [], None)
+    monkeypatch.setattr(one, "slope", slope)
+    monkeypatch.setattr(one, "cost", lambda free: asked.append(("cost", float(free[0]))) or left.pop(0))
+    step = one._along(np.array([5.0]), np.array([-4.0]), 10.0, np.array([0.5]))
+    again = [("slope", 5.0 - 4.0 * tried[-1])] if step and len(tried) > 1 else []
+    assert [what for what, _ in asked] == ["slope", *["cost"] * (len(tried) - 1), *["slope"] * len(again)]
+    assert [at for _, at in asked] == pytest.approx([5.0 - 4.0 * part for part in tried] + [at for _, at in again])
+    if refusals is None:
+        assert step is None
+    else:
+        assert (step.cost, step.refusals, step.slope.tolist()) == (costs[-1], refusals, [3.0])
+        assert step.free == pytest.approx([5.0 - 4.0 * tried[-1]])
+
+
+def test_a_step_ends_at_a_limit_and_is_judged_by_what_it_promises_that_far(monkeypatch):
+    one = Search(line(least=4.0), [], np.ones(0), [], None)
+    monkeypatch.setattr(one, "slope", lambda free: (10.0 - 1e-4, np.array([3.0])))
+    step = one._along(np.array([5.0]), np.array([-40.0]), 10.0, np.array([0.5]))
+    assert step.free.tolist() == [4.0]
+
+
+def scripted(monkeypatch, steps, iterations=99, refresh=2, ends=lambda done: False):
+    """A search whose steps come out as told: None, or how many were tried in vain; what it asks for, and its end."""
+    left, asked = list(steps), []
+    one = Search(line(), [], np.ones(0), [], None)
+    monkeypatch.setattr(one, "slope", lambda free: (100.0, np.array([1.0])))
+    monkeypatch.setattr(one, "curvature", lambda free: asked.append(f"curvature at {free[0]:g}") or np.array([[4.0]]))
+    monkeypatch.setattr(one, "size", lambda matrix: np.sqrt(np.diag(matrix)))
+
+    def bounded(free, slope, curvature, damping):
+        matrix, size, pairs = curvature
+        assert (matrix.tolist(), size.tolist()) == ([[1.0]], [2.0])
+        asked.append((damping, len(pairs)))
+        return np.array([-1.0]), damping
+
+    def along(free, move, cost, slope):
+        refusals = left.pop(0)
+        if refusals is None:
+            return None
+        return search_of._Step(free + move, cost - 1.0, slope + 2.0, refusals)
+
+    monkeypatch.setattr(one, "_bounded_step", bounded)
+    monkeypatch.setattr(one, "_along", along)
+    told = []
+    end = one.minimise(
+        np.array([50.0]), iterations, refresh, lambda done, free, cost: told.append((done, free[0], cost)) or ends(done)
+    )
+    assert left == [] and told == [(k, 50.0 - k, 100.0 - k) for k in range(1, len(told) + 1)]
+    assert end == 50.0 - len(told)
+    return asked
+
+
+def test_damping_falls_with_each_whole_step_and_rises_with_others_and_the_curvature_is_taken_anew(monkeypatch):
+    """Every second step; before that where a step leads nowhere, unless it was just taken."""
+    asked = scripted(monkeypatch, [0, 1, None, None, 0, None, 0], ends=lambda done: done == 4)
+    dampings = [each[0] for each in asked if isinstance(each, tuple)]
+    assert dampings == pytest.approx([1e-2, 5e-3, 1e-2, 3e-2, 9e-2, 4.5e-2, 0.135])
+    assert [each if isinstance(each, str) else each[1] for each in asked] == [
+        *("curvature at 50", 0, 1),
+        *("curvature at 48", 0, 0, 0, 1),
+        *("curvature at 47", 0),
+    ]
+
+
+def test_a_search_ends_with_the_ninth_step_in_a_row_that_leads_nowhere(monkeypatch):
+    asked = scripted(monkeypatch, [0, *[None] * 8, 0, *[None] * 9])
+    assert len([each for each in asked if isinstance(each, tuple)]) == 19
+    assert asked[-1][0] == pytest.approx(1e-2 / 4 * 3.0**16)
+
+
+def test_a_search_keeps_thirty_steps_and_a_least_damping_and_ends_after_its_largest_number(monkeypatch):
+    asked = scripted(monkeypatch, [0] * 40, iterations=40, refresh=100)
+    assert asked[0] == "curvature at 50"
+    assert [pairs for _, pairs in asked[1:]] == [min(k, 30) for k in range(40)]
+    assert [damping for damping, _ in asked[1:]] == pytest.approx([max(1e-2 / 2**k, 1e-5) for k in range(40)])
