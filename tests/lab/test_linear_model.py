@@ -1325,3 +1325,101 @@ def test_an_order_is_the_best_of_two_starts_with_exchanges_polished_once_more_on
         *((("all", 40, "power"), end, last) for end in ends),
     ]
     assert found.model == ("grown" if fine and smaller else best)
+
+
+class Answer(SimpleNamespace):
+    """What stands for a fit, by its words."""
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize(
+    ("elements", "orders", "tried", "final", "reports"),
+    [
+        ((2, 3), [4, 2, 6], [2, 4, 6], (4, 7), 5),
+        ((1, 1), [4, 2], [1, 2, 3, 4], None, 6),
+        ((2, 1), 3, [], (3, 7), 3),
+        ((1, 1), 3, [1, 2, 3], None, 5),
+    ],
+)
+def test_orders_are_fitted_scored_and_the_chosen_one_polished_in_frequency_and_in_time(
+    monkeypatch, periodic, elements, orders, tried, final, reports
+):
+    """Of one element each order sets out from the one before; of several the chosen one is fitted with exchanges."""
+    response = Answer(response=np.zeros((20, *elements)), freq_hz=np.arange(1.0, 21.0), hold="first-order")
+    records = [Answer(period_samples=8), Answer(period_samples=8 if periodic else None)]
+    fitted, told = [], []
+
+    def fit_one(given, order, *, direct, exchanges, fine=True, smaller=None):
+        assert given is response and direct is False
+        fitted.append((order, exchanges, fine, smaller))
+        return Answer(model=f"model {order}" + " exchanged" * bool(exchanges))
+
+    def polished(equations, model, *, iterations):
+        assert equations == ("in time", records, "first-order", 11, False) and iterations == 30
+        return Answer(model=f"{model} in time")
+
+    monkeypatch.setattr(fit_module, "response_from_periods", lambda given: response if periodic else None)
+    monkeypatch.setattr(fit_module, "response_from_records", lambda given: None if periodic else response)
+    monkeypatch.setattr(fit_module, "fit_order", fit_one)
+    monkeypatch.setattr(
+        fit_module, "TimeEquations", lambda given, hold, drop, *, direct: ("in time", given, hold, drop, direct)
+    )
+    monkeypatch.setattr(fit_module, "polish", polished)
+    monkeypatch.setattr(fit_module, "_score", lambda given, fit, direct: (fit.model, direct))
+    monkeypatch.setattr(fit_module, "choose", lambda scan: (4, f"of {len(scan)}"))
+    monkeypatch.setattr(fit_module, "_linear_fit", lambda *given: given)
+    found = fit_linear(
+        records, orders, strictly_proper=True, drop=11, exchanges=7, on_progress=lambda *given: told.append(given)
+    )
+    several = elements != (1, 1)
+    first = [(n, 0, not several, None if several or n == 1 else f"model {n - 1}") for n in tried]
+    assert fitted == first + ([(*final, True, None)] if final else [])
+    compared = sorted(orders) if isinstance(orders, list) else []
+    chosen = 4 if compared else 3
+    last = f"model {chosen}" + " exchanged" * several + " in time" * (not periodic)
+    reason = f"of {len(compared)}" if compared else "order 3 was given"
+    assert found[0] is records and found[1] is response and found[2].model == last
+    assert found[3:] == ([(f"model {n}", False) for n in compared], reason, 11, False)
+    assert [done for done, *_ in told] == list(range(1, reports + 1)) and {total for _, total, _ in told} == {reports}
+    assert [what for *_, what in told[-2:]] == ["polish in frequency", "polish in time"]
+    assert [what for *_, what in told[:-2]] == [f"order {n}" for n in tried or [3]]
+
+
+@pytest.mark.parametrize(
+    ("lines", "first", "orders"), [(3, [1, 2], [1, 2]), (4, [1, 2, 3], [1, 2, 3]), (20, [1, 2, 3], range(1, 9))]
+)
+def test_a_scan_of_an_axis_begins_with_the_best_of_three_small_models_as_far_as_the_lines_fix_them(
+    monkeypatch, lines, first, orders
+):
+    """The second one is the best of them: its delay, creep and loss are taken off, and orders begin at its delay."""
+    asked, told, started = [], [], []
+
+    def fit_one(given, order, *, direct, exchanges, smaller=None):
+        assert direct is False and exchanges == 0
+        asked.append((given.response, order, smaller))
+        return Answer(model=Answer(all_poles_rad_s=np.array([order]), of=order))
+
+    class Problem:
+        def started(self, poles, zeros, delay_s):
+            started.append((poles, zeros, delay_s))
+            return poles[0]
+
+        def fitted(self, order):
+            number = len(started)
+            cost = {1: 9.0, 2: 4.0, 3: 5.0}[number] if number <= len(first) else 90.0 - 10.0 * order
+            return Answer(criterion=cost + order, chi_square=cost, freedom=10, at=Answer(delay_s=number * 1e-3))
+
+    monkeypatch.setattr(axis, "fit_order", fit_one)
+    monkeypatch.setattr(axis, "transmission_zeros", lambda model, below: np.array([model.of, below]))
+    monkeypatch.setattr(axis, "_freed", lambda fit, given: ("freed", fit.criterion, given.response))
+    monkeypatch.setattr(axis, "replace", lambda given, *, response: Answer(**vars(given) | {"response": response}))
+    response = Answer(freq_hz=np.arange(1.0, 1.0 + lines), response="measured", rate_hz=500.0)
+    found = axis._scan(Problem(), response, lambda *given: told.append(given))
+    freed = ("freed", 6.0, "measured")
+    assert [each[:2] for each in asked] == [*(("measured", n) for n in first), *((freed, n) for n in orders)]
+    assert [each[2] for each in asked[: len(first) + 1]] == [None] * (len(first) + 1)
+    assert [each[2].of for each in asked[len(first) + 1 :]] == list(orders)[:-1]
+    edge = pytest.approx(1000.0 * np.pi)
+    assert started == [*(([n], [n, edge], 0.0) for n in first), *(([n], [n, edge], 2e-3) for n in orders)]
+    assert told == [(n, 10, f"order {n}") for n in orders]
+    assert [fit.at.delay_s for fit in found] == [1e-3 * (len(first) + n) for n in orders]
