@@ -1504,3 +1504,32 @@ def test_the_delay_of_a_linear_model_goes_on_by_its_own_steps_until_these_are_sm
     assert found.delay_s == pytest.approx(delays[-1], abs=1e-12) and found.delay_error_s == pytest.approx(error)
     assert found.modes is models[-1][0] and (found.order, found.parameters) == (2, 6)
     assert found.poles_error_rad_s.tolist() == [1 + 1j] and found.known.parameters[-1] == "recording.delay"
+
+
+@pytest.mark.parametrize(
+    ("classes", "driven", "inputs", "held", "left"),
+    [
+        ([0, 0, 1, 2], None, 3, [1], 3),
+        ([1, 0, 1, 0, 1], None, 3, [3, 4], 3),
+        ([0, 0, 1, 2], None, 4, [1], None),
+        ([1, 0, 1, 0, 1], None, 4, [3, 4], None),
+        ([0, 0, 0, 0, 0], [0, 1, 2, 1, 0], 3, [3, 4], 3),
+    ],
+)
+def test_what_is_left_counts_those_held_out_and_not_the_kinds_that_have_one_record(classes, driven, inputs, held, left):
+    """Kinds are amplitudes, or sets of driven channels; of each with two records or more the last one is held out."""
+    given = [drawn_at_random(f"r{k}", 64, inputs, seed=k, period=32) for k in range(len(classes))]
+    if driven:
+        alone = [np.arange(inputs) == channel for channel in driven]
+        given = [replace(r, drive=r.drive * own) for r, own in zip(given, alone, strict=True)]
+    if left is None:
+        with pytest.raises(IdentificationError) as caught:
+            channels_module._held_out(given, np.array(classes))
+        assert str(caught.value) == (
+            f"{len(classes)} records for {inputs} actuators: {len(held)} held out to judge the models by leave "
+            f"{len(classes) - len(held)}, and at least {inputs} realisations with different drives are needed; record "
+            "more, or give recordings for validation."
+        )
+    else:
+        assert channels_module._held_out(given, np.array(classes)).tolist() == held
+        assert len(classes) - len(held) == left

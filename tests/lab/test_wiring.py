@@ -302,3 +302,21 @@ def test_each_of_four_drives_has_to_move_something(drive):
         f"u.npy: the drive 'u{drive}' moves nothing: the response of every output to it is within its noise; check the "
         "actuator and its amplifier, drive it harder, or leave it out."
     )
+
+
+@pytest.mark.parametrize("drive", [0, 1])
+@pytest.mark.parametrize(("peak", "moves"), [(1.05, True), (0.95, False)])
+def test_a_drive_that_moves_one_output_at_one_line_is_judged_by_the_noise_of_that_output_alone(drive, peak, moves):
+    """Twenty lines with noise of 0.1, so 0.2 in all, of which 0.4 is twice; the other drive's noise is far larger."""
+    gain = np.array(((40.0, 40.0), (-40.0, 40.0)))
+    gain[:, drive] = 0.0
+    response = made(gain)
+    moving, error = response.response.copy(), np.full(response.standard_error.shape, 7.0)
+    error[:, :, drive] = 5.0
+    error[:, 1, drive] = 0.1
+    moving[12, 1, drive] = peak * np.sqrt(2.0 * 20.0) * 0.1
+    noisy = replace(response, response=moving, standard_error=error)
+    if moves:
+        check_wiring("u.npy", noisy, TWO, None)
+    else:
+        assert f"the drive 'u{drive}' moves nothing" in refusal(noisy, None, TWO)
