@@ -778,3 +778,38 @@ def test_the_best_of_the_four_most_promising_changes_is_made_where_it_lowers_the
     left = pole_zero.pruned(begin)
     assert (left.at == "d") is taken and (left is begin) is not taken
     assert asked == [*((one, 4) for one in "abcdef"), *((one, None) for one in "fedc")]
+
+
+@pytest.mark.parametrize(
+    ("poles_hz", "zeros_hz", "kept"),
+    [
+        ((-20, -30, -10 + 30j), (-25, 249), [25.0, -249.0]),
+        ((-20, -30, -10 + 30j), (-25, 251), [25.0]),
+        ((-1, -20, -30, -45), (-40,), [40.0]),
+        ((-1, -20, -30, -45), (-15, -40), [40.0]),
+        ((-1, -20, -30, -45), (-17, -40), [17.0, 40.0]),
+        ((-1, -20, -30, -45), (9, -40), [40.0]),
+        ((-1, -20, -30, -45, -47), (-1 + 3j, -40), [np.sqrt(10.0), 40.0]),
+        ((-1, -2, -20, -30, -45), (-3, -5, -12), [12.0]),
+        ((-9, -20, -30), (-8.5,), [8.5]),
+    ],
+)
+def test_a_slow_pole_takes_one_slow_real_zero_along_and_what_is_far_is_left_out(poles_hz, zeros_hz, kept):
+    """The slowest real pole is at 8 Hz, a zero beside it below 16 Hz; 250 Hz are five times the highest frequency."""
+    problem, _ = problem_of()
+
+    def rad(values):
+        whole = [TURN * complex(each) for each in values]
+        return whole + [each.conjugate() for each in whole if each.imag]
+
+    start = problem.started(rad(poles_hz), rad(zeros_hz), 1e-3)
+    assert [zero.frequency_hz for zero in start.zeros] == pytest.approx(kept)
+    assert len(start.poles) == sum(abs(complex(pole)) > 8.0 for pole in poles_hz)
+
+
+@pytest.mark.parametrize(("values", "freedom"), [(14, 3), (12, 1), (11, 1), (4, 1)])
+def test_a_fit_of_as_many_numbers_as_values_counts_one_degree_of_freedom(values, freedom):
+    """A pair, a real zero, a delay, gain and loss and five lags are eleven numbers."""
+    problem = SimpleNamespace(values=values, lags_s=(1e-2, 2e-2, 3e-2, 4e-2, 5e-2))
+    fit = pole_zero.Fitted(problem, PoleZero((Root(30.0, 0.2),), (Root(45.0, None),), 1e-3), 5.0)
+    assert (fit.parameters, fit.freedom) == (11, freedom)

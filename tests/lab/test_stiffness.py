@@ -36,6 +36,7 @@ from microrad.lab.identify.stiffness.gradient import squared_error_slope
 from microrad.lab.identify.stiffness.model import LinearStart, Numbers, scaled
 from microrad.lab.identify.stiffness.search import Search
 from microrad.lab.recording import Recording, multisine_recordings
+from microrad.mirror import coupled
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
@@ -1715,3 +1716,43 @@ def test_a_search_keeps_thirty_steps_and_a_least_damping_and_ends_after_its_larg
     assert asked[0] == "curvature at 50"
     assert [pairs for _, pairs in asked[1:]] == [min(k, 30) for k in range(40)]
     assert [damping for damping, _ in asked[1:]] == pytest.approx([max(1e-2 / 2**k, 1e-5) for k in range(40)])
+
+
+def test_a_fit_is_trusted_by_steps_so_fine_that_its_polynomial_goes_on_as_far_as_the_drive(monkeypatch):
+    """At 100 Hz and two steps a sample the loop through what goes on is no contraction above 2 ms: eight are taken."""
+    plays = (PrandtlIshlinskii((0.0,), (1.0,), 0.0, np.inf, (0.0, 0.0, 0.1), 2.0),)
+    none = np.zeros((0, 0))
+    own = Mirror(
+        *("one", none, np.zeros((0, 1)), np.zeros((0, 1)), np.zeros((1, 0)), np.eye(1)),
+        *(np.zeros((1, 0)), np.zeros((1, 1)), np.ones((1, 1)), (), plays, ()),
+    )
+    fit = SimpleNamespace(
+        mirror=own,
+        classes=(0, 1),
+        amplitudes=(0.5, 1.0),
+        error_rms=np.array([0.02, 0.04]),
+        rate_hz=100.0,
+        sub_steps=2,
+        delay_s=0.0,
+        motion=np.array([2.0]),
+    )
+    asked, steps = [], []
+
+    def responded(mirror, drive, rate_hz, sub_steps, delay_s):
+        asked.append((mirror.plays[0].reach_v, rate_hz, sub_steps, delay_s))
+        return coupled.response(mirror, drive, rate_hz, sub_steps, delay_s)
+
+    def returned(mirror, step_s):
+        steps.append(step_s)
+        return 0.999 if step_s < 2e-3 else 1.0
+
+    monkeypatch.setattr(fit_of, "coupled", SimpleNamespace(response=responded))
+    monkeypatch.setattr(fit_of, "contraction", returned)
+    drive = 4.0 * np.sin(2 * np.pi * np.arange(64) / 64)[:, None]
+    found = trust(fit, drive)
+    assert steps == pytest.approx([5e-3, 2.5e-3, 1.25e-3])
+    assert asked == [(2.0, 100.0, 2, 0.0), (2.0, 100.0, 8, 0.0), (pytest.approx(4.0), 100.0, 8, 0.0)]
+    s = drive[:, 0] / 2.0
+    assert found.open == pytest.approx(np.sqrt(np.mean((0.1 * (np.clip(s, -1, 1) ** 3 - s**3)) ** 2)), rel=1e-6)
+    assert found.left == pytest.approx(0.04 * np.sqrt(8.0)) and found.motion == pytest.approx(2.0)
+    assert found.error_rms == pytest.approx(np.hypot(found.left, found.open))

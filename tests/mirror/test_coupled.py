@@ -3,6 +3,7 @@
 import tomllib
 from dataclasses import fields, replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import oracles
 from microrad.core import lti
 from microrad.mirror import coupled
 from microrad.mirror.coupled import Actuator, CoupledMirror, Known, Output
+from microrad.mirror.coupled.reading import _known
 from microrad.mirror.coupled.spread import accepted, changed, directions, drawn, draws, is_one, moved
 from microrad.mirror.hysteresis import BoucWen, PrandtlIshlinskii
 from microrad.mirror.model import Mirror
@@ -1134,3 +1136,20 @@ def test_what_is_0_in_an_element_stays_at_least_0(change):
     assert first == replace(own.mirror.plays[0], thresholds_v=(least, 1.5))
     weights, bends = (0.3, least, 0.05), (0.7, change, 0.9)
     assert second == replace(bent, weights_rad_v=weights, widening_s=least, polynomial_rad=bends)
+
+
+def test_a_correlation_that_rounding_left_indefinite_is_one_of_rows_of_length_one():
+    """Two of its pairs are 0.99 and the third 0.93, which cannot be. The second element of the file stands first here."""
+    rounded = np.array([[1.0, 0.99, 0.99], [0.99, 1.0, 0.93], [0.99, 0.93, 1.0]])
+    sizes, vectors = np.linalg.eigh(rounded)
+    assert sizes[0] < -1e-4
+    nearest = (vectors * np.maximum(sizes, 0.0)) @ vectors.T
+    length = np.sqrt(np.diag(nearest))
+    names = ("hysteresis.1.epsilon", "matrices.E.3.2", "modes.decay.1")
+    table = SimpleNamespace(factor=None, correlation_matrix=rounded, parameters=names, standard_errors=(1e-6, 0.2, 3.0))
+    known = _known(table, [1, 0])
+    assert known.parameters == ("hysteresis.2.epsilon", "matrices.E.3.1", "modes.decay.1")
+    assert known.standard_errors.tolist() == [1e-6, 0.2, 3.0]
+    np.testing.assert_allclose(np.linalg.norm(known.factor, axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(known.correlation, nearest / np.outer(length, length), atol=1e-12)
+    assert np.max(np.abs(length - 1.0)) > 1e-4
