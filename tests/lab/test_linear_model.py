@@ -3,7 +3,7 @@
 import math
 import os
 from collections import namedtuple
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -1423,3 +1423,60 @@ def test_a_scan_of_an_axis_begins_with_the_best_of_three_small_models_as_far_as_
     assert started == [*(([n], [n, edge], 0.0) for n in first), *(([n], [n, edge], 2e-3) for n in orders)]
     assert told == [(n, 10, f"order {n}") for n in orders]
     assert [fit.at.delay_s for fit in found] == [1e-3 * (len(first) + n) for n in orders]
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_an_axis_is_scanned_freed_of_its_estimate_weighed_by_what_no_order_explains_and_pruned(monkeypatch, periodic):
+    """Of three orders the first has the least criterion, the last the least distance, and weighed so the second one."""
+    first = {"a": (5.0, 50.0), "b": (7.0, 30.0), "c": (9.0, 20.0)}
+    unbiased = {"a": (6.0, 40.0), "b": (8.0, 35.0), "c": (9.5, 25.0)}
+    weighed = {"a": (4.0, 3.0), "b": (1.0, 2.0), "c": (2.0, 1.0)}
+
+    def fits_of(table, name):
+        return Answer(at=name, criterion=table[name][0], chi_square=table[name][1], table=table)
+
+    class Problem:
+        def __init__(self, response, lags, length_s, table=None):
+            made.append((response, lags, length_s))
+            self.table = unbiased if len(made) > 1 else first
+            self.lags_s = ("kept", lags)
+
+        def fitted(self, at):
+            return fits_of(self.table, at)
+
+        def worth_less(self, at):
+            assert at == "c"
+            heard.append(self.table)
+            self.table = weighed
+            return self
+
+    @dataclass
+    class Response:
+        name: str
+        hold: str = "band-limited"
+
+    made, heard, told = [], [], []
+    records = [Answer(period_samples=p, samples=90, step_s=0.01) for p in ((30, 30) if periodic else (30, None))]
+    monkeypatch.setattr(axis, "response_from_periods", lambda given: Response("periods"))
+    monkeypatch.setattr(axis, "response_from_records", lambda given, bands=0: Response(f"records, {bands} bands"))
+    monkeypatch.setattr(axis, "_lags", lambda response: f"lags of {response.name}")
+    monkeypatch.setattr(axis, "PoleZeroProblem", Problem)
+    monkeypatch.setattr(
+        axis,
+        "_scan",
+        lambda problem, response, report: heard.append(response) or [fits_of(first, name) for name in "abc"],
+    )
+    monkeypatch.setattr(axis, "_unbiased", lambda given, fine, best: ("unbiased", fine, best.at, best.table is first))
+    monkeypatch.setattr(axis, "pruned", lambda fit: ("pruned", fit.at, fit.table is weighed))
+    monkeypatch.setattr(axis, "_linear_fit", lambda *given: given)
+    found = axis.fit_axis(records, hold="zero-order", on_progress=lambda *given: told.append(given))
+    whole = Response("periods" if periodic else "records, 0 bands", "zero-order")
+    fine = whole if periodic else Response("records, 500 bands", "zero-order")
+    length = pytest.approx(0.3)  # of the first record: a period
+    assert made[0] == (fine, f"lags of {fine.name}", length)
+    again = (("unbiased", fine, "a", True), ("kept", f"lags of {fine.name}"), length)
+    assert made[1:] == ([] if periodic else [again])
+    assert heard == [whole, first if periodic else unbiased]
+    assert found[:3] == (records, whole, ("pruned", "b", True))
+    assert [(fit.at, fit.table is weighed) for fit in found[3]] == [(name, True) for name in "abc"]
+    assert told == [(9, 10, "poles that are not needed"), (10, 10, "errors of poles and zeros")]
