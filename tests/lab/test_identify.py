@@ -1857,3 +1857,35 @@ def test_a_fit_without_a_start_is_refused_before_its_recordings_are_looked_at(st
     with pytest.raises(IdentificationError) as refused:
         fit_bouc_wen([], starts=starts)
     assert str(refused.value) == f"{starts} starts were asked for; give at least 1, better 10 or more."
+
+
+@pytest.mark.parametrize("admissible", [True, False])
+def test_a_fit_of_eq_3_is_searched_from_its_starts_and_tightened_where_it_is_to_be_admissible(monkeypatch, admissible):
+    asked = []
+
+    class Problem:
+        def __init__(self, records, share):
+            self.said = (records, share)
+
+        def solve(self, best):
+            return ("solved", best, self)
+
+    def searched(problem, *given):
+        asked.append((problem.said, *given[:2]))
+        given[2](1, 5, "told")
+        return "costs", "best"
+
+    other = Problem("tightened", 0.3)
+    monkeypatch.setattr(bouc_wen_of, "si_records", lambda recordings, units: (recordings, units))
+    monkeypatch.setattr(bouc_wen_of, "BoucWenProblem", Problem)
+    monkeypatch.setattr(bouc_wen_of, "search_from_starts", searched)
+    monkeypatch.setattr(bouc_wen_of, "with_tightened_bound", lambda problem, best: (other, f"{best} tightened"))
+    monkeypatch.setattr(bouc_wen_of, "_report", lambda *given: given)
+    told, units = [], Units("mV", "mrad")
+    words = {"starts": 1, "seed": 7, "admissible": admissible, "units": units}
+    problem, values, *rest = fit_bouc_wen("recordings", on_progress=lambda *given: told.append(given), **words)
+    assert asked == [((("recordings", units), 1.0 if admissible else math.inf), 1, 7)] and told == [(1, 5, "told")]
+    assert values == ("solved", "best tightened" if admissible else "best", problem)
+    assert (problem is other) is admissible and rest == [units, "costs", admissible]
+    fit_bouc_wen("recordings")
+    assert asked[-1] == ((("recordings", Units()), math.inf), 12, 0) and len(told) == 1
