@@ -1480,3 +1480,13 @@ def test_an_axis_is_scanned_freed_of_its_estimate_weighed_by_what_no_order_expla
     assert found[:3] == (records, whole, ("pruned", "b", True))
     assert [(fit.at, fit.table is weighed) for fit in found[3]] == [(name, True) for name in "abc"]
     assert told == [(9, 10, "poles that are not needed"), (10, 10, "errors of poles and zeros")]
+
+
+@pytest.mark.parametrize(("resonance_hz", "lines"), [(399.0, 1), (400.0, 2), (30.0, 1), (1e4, 4)])
+def test_a_gain_below_a_resonance_is_the_mean_up_to_a_tenth_of_it_or_that_of_the_lowest_line(resonance_hz, lines):
+    """Three outputs of two drives: the largest gain of all directions at each line."""
+    draw = philox(21).standard_normal((2, 4, 3, 2))
+    gains = draw[0] + 1j * draw[1]
+    fit = SimpleNamespace(response=SimpleNamespace(freq_hz=np.array([10.0, 40.0, 90.0, 160.0]), response=gains))
+    expected = np.mean([np.linalg.norm(each, 2) for each in gains[:lines]])
+    assert amplitude._low_gain(fit, resonance_hz) == pytest.approx(expected, rel=1e-12)
