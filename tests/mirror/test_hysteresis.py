@@ -881,3 +881,17 @@ def test_plays_have_a_weight_for_each_threshold_and_none_to_spare(thresholds, we
     with pytest.raises(ValueError, match=r"V with .* weights make no Prandtl-Ishlinskii operator|give finite numbers"):
         PrandtlIshlinskii(thresholds, (1e-6,) * weights)
     assert PrandtlIshlinskii((0.0, 1.0), (1e-6, 2e-6)).thresholds_v == (0.0, 1.0)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_output_that_no_drive_makes_is_told_with_the_slope_at_the_fastest_rate_whichever_way_that_is(sign):
+    """It goes up by 1 V a step of 1 ms and back by 2 V, over and over: the faster way is the other one for -1."""
+    model = BoucWen(50e-6, 0.0, -40e-6, 2e-4, 0.3, 0.1)
+    up, down = np.arange(0.0, 10.0, 1.0), np.arange(10.0, 0.0, -2.0)
+    output = sign * 50e-6 * np.tile(np.concatenate([up, down]), 6)
+    slope = 50e-6 - 40e-6 * exp(2e-4 * 2000.0) * 2 * 0.3 / (0.3 - 0.1)
+    with pytest.raises(ValueError) as refused:
+        model.inverse(output, 1e-3)
+    assert str(refused.value) == (
+        "no drive was found in 300 steps that makes this output: behind a reversal the slope of the model is "
+        f"{slope:.3g} rad/V at its fastest rate, and its inverse needs one above 0; fit it with admissible=True, or "
+        "take a Prandtl-Ishlinskii model"
+    )
