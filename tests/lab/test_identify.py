@@ -1812,6 +1812,8 @@ def test_plays_are_correlated_over_what_was_fitted_alone():
     assert again == numbers
     assert_allclose(same, found, rtol=1e-9)
     assert np.abs(covariance((one, 20, 400), (two, 30, 300))[1] - found).max() > 1e-14
+
+
 @pytest.mark.parametrize("d1", [4.0, -4.0])
 def test_the_share_of_a_bound_is_lowered_by_what_the_lowest_slope_lacks_until_it_is_within_its_tolerance(
     monkeypatch, d1

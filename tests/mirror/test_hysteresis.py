@@ -881,6 +881,8 @@ def test_plays_have_a_weight_for_each_threshold_and_none_to_spare(thresholds, we
     with pytest.raises(ValueError, match=r"V with .* weights make no Prandtl-Ishlinskii operator|give finite numbers"):
         PrandtlIshlinskii(thresholds, (1e-6,) * weights)
     assert PrandtlIshlinskii((0.0, 1.0), (1e-6, 2e-6)).thresholds_v == (0.0, 1.0)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_output_that_no_drive_makes_is_told_with_the_slope_at_the_fastest_rate_whichever_way_that_is(sign):
     """It goes up by 1 V a step of 1 ms and back by 2 V, over and over: the faster way is the other one for -1."""
