@@ -2558,3 +2558,16 @@ def test_a_list_of_keys_may_have_just_the_most_items():
     assert KeyList(None, most=2).read(["a", "b"]) == ("a", "b")
     with pytest.raises(ProblemsError):
         KeyList(None, most=2).read(["a", "b", "c"])
+def test_the_schema_names_its_draft_and_lets_the_mirror_stand_in_another_file():
+    schema = mission_schema()
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    here, there = schema["properties"]["mirror"]["anyOf"]
+    assert schema["$defs"][here["$ref"].removeprefix("#/$defs/")]["title"] == "Mirror"
+    assert there == {
+        "type": "object",
+        "properties": {"file": {"type": "string", "description": "mirror file, seen from the mission file"}},
+        "required": ["file"],
+        "additionalProperties": False,
+    }
+    assert list(schema["properties"])[:2] == ["name", "pointing"]
+    assert "transmit_power" in schema["$defs"]["Communication"]["required"]
