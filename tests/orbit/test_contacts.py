@@ -1369,3 +1369,99 @@ def test_no_wavelength_but_one_above_nothing_has_a_doppler_shift(wavelength_m):
 def test_a_span_whose_ends_are_no_numbers_or_turned_holds_no_time(span_s):
     with pytest.raises(OrbitError, match=f"^the span from {span_s[0]:g} s to {span_s[1]:g} s holds no time; give a"):
         coarse_times(span_s, 60.0)
+def states_along(name, position_m):
+    """An orbit without a sum behind it: its places by a function of time, its velocities by differences."""
+
+    def states(time_s):
+        after, before = position_m(time_s + 0.5), position_m(time_s - 0.5)
+        return States(position_m(time_s), after - before)
+
+    return SimpleNamespace(name=name, states=states)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_two_terminals_that_meet_later_on_are_told_with_the_time_and_in_the_order_of_the_alphabet(turned):
+    """They are in one place at 300 s; at the first of the samples they are far from one another."""
+    one = states_along("zulu", lambda t: np.stack((7e6 + 0.0 * t, 7e3 * (t - 300.0), 0.0 * t)))
+    two = states_along("alfa", lambda t: np.stack((7e6 + 0.0 * t, 0.0 * t, 5e3 * (t - 300.0))))
+    own, other = (Terminal(each, UNLIMITED, each.name) for each in ((two, one) if turned else (one, two)))
+    side = limits.Side(own, other, ROUND, EPOCH)
+    time_s = np.array([0.0, 150.0, 300.0, 450.0])
+    with pytest.raises(OrbitError) as refused:
+        side.look(time_s)
+    assert str(refused.value) == "alfa and zulu are at the same place at 300 s; give two different orbits"
+    look = side.look(time_s[[0, 1, 3]])
+    apart = -1.0 if turned else 1.0
+    line = np.array([0.0, 7.0, -5.0]) / math.sqrt(74.0)
+    np.testing.assert_allclose(look.direction.T, apart * np.outer([1.0, 1.0, -1.0], line), atol=1e-12)
+
+
+@pytest.mark.parametrize("boresight", [
+    (math.inf, 0.0, 0.0), (0.0, -math.inf, 1.0), (0.0, 0.0, math.nan), (0.0, 0.0, 0.0), (1.0, 2.0),
+    (1.0, 0.0, 0.0, 0.0),
+])  # fmt: skip
+def test_a_boresight_needs_three_finite_numbers_that_are_not_all_nothing(boresight):
+    with pytest.raises(OrbitError) as refused:
+        Limits("nadir", boresight, 1.0, math.inf, 0.0, True)
+    assert str(refused.value) == f"the boresight {boresight} has no direction; give three numbers, such as (0, 0, 1)"
+    assert Limits("nadir", (-1e-9, 0.0, 1e12), 1.0, math.inf, 0.0, True).boresight == (-1e-9, 0.0, 1e12)
+
+
+def test_samples_are_put_between_where_a_direction_turns_fast_and_only_there():
+    """The first direction turns by 0.1 rad/s up to 10 s; the second by 0.5 rad/s between 20 s and 21 s alone."""
+
+    def directions(time_s):
+        angles = np.stack((0.1 * np.minimum(time_s, 10.0), 0.5 * np.clip(time_s - 20.0, 0.0, 1.0)))
+        return np.stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)), axis=1)
+
+    coarse = np.array([0.0, 4.0, 10.0, 12.0, 20.0, 21.0, 30.0])
+    found = events.refined(directions, coarse, 0.29)
+    expected = [0.0, 2.0, 4.0, 5.5, 7.0, 8.5, 10.0, 12.0, 20.0, 20.5, 21.0, 30.0]
+    assert found.tolist() == expected  # 0.2 and 0.15 rad a step, then 0.25 rad
+    assert events.refined(directions, coarse, 0.61).tolist() == coarse.tolist()
+    assert events.refined(directions, found, 0.29).tolist() == expected
+    at_once = np.array([0.0, 1e-3, 3e-3])
+
+    def jumps(time_s):
+        turned = np.where(time_s > 0.0, 1.0, 0.0)
+        return np.stack((np.cos(turned), np.sin(turned), 0.0 * turned))[None]
+
+    assert events.refined(jumps, at_once, 0.1).tolist() == [0.0, 1e-3, 3e-3]  # no step below a millisecond
+    assert events.refined(jumps, np.array([0.0, 0.004]), 0.1).tolist() == [0.0, 0.001, 0.002, 0.004]
+
+
+def test_the_largest_values_of_windows_of_unlike_lengths_are_found_in_each():
+    """Peaks at 3, 50 and 120 s of heights 1, 4 and 2; the last window has its largest value at its end."""
+    peaks, heights = np.array([3.0, 50.0, 120.0]), np.array([1.0, 4.0, 2.0])
+
+    def bumps(time_s):
+        return np.max(heights[:, None] - 0.01 * (time_s - peaks[:, None]) ** 2, axis=0)
+
+    windows = np.array([[0.0, 10.0], [20.0, 80.0], [110.0, 119.0]])
+    when, value = events.largest(bumps, windows, 2.0)
+    assert when.tolist() == pytest.approx([3.0, 50.0, 119.0], abs=1e-3)
+    assert value.tolist() == pytest.approx([1.0, 4.0, 1.99], abs=1e-7)
+    when, value = events.largest(bumps, windows[[2, 0]], 0.25)
+    assert (when.tolist(), value.tolist()) == (pytest.approx([119.0, 3.0], abs=1e-3), pytest.approx([1.99, 1.0]))
+
+
+def test_the_places_of_stations_far_above_the_sea_stand_each_in_their_own_row():
+    """Of three unlike stations, with heights that show: the first on the equator, the second at the pole."""
+    given = [
+        Station("a", 0.0, 0.4, 3000.0, 0.1),
+        Station("b", math.pi / 2.0, -1.0, 2000.0, 0.2),
+        Station("c", -0.6, 2.5, -400.0, 0.3),
+    ]
+    rows = StationRows.of(given, EPOCH)
+    polar = EARTH_RADIUS_M * (1.0 - FLATTENING)
+    assert rows.across_m[:2].tolist() == pytest.approx([EARTH_RADIUS_M + 3000.0, 0.0], abs=1e-6)
+    assert rows.along_axis_m[:2].tolist() == pytest.approx([0.0, polar + 2000.0], abs=1e-6)
+    square = FLATTENING * (2.0 - FLATTENING)
+    normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * math.sin(0.6) ** 2)
+    assert rows.across_m[2] == pytest.approx((normal - 400.0) * math.cos(0.6), abs=1e-6)
+    assert rows.along_axis_m[2] == pytest.approx(-(normal * (1.0 - square) - 400.0) * math.sin(0.6), abs=1e-6)
+    assert (rows.longitude_rad.tolist(), rows.mask_rad.tolist()) == ([0.4, -1.0, 2.5], [0.1, 0.2, 0.3])
+    assert rows.level.tolist() == pytest.approx([1.0, 0.0, math.cos(0.6)], abs=1e-12)
+    assert rows.rise.tolist() == pytest.approx([0.0, 1.0, -math.sin(0.6)], abs=1e-12)
+    none = StationRows.of([], EPOCH)
+    assert [part.shape for part in (none.longitude_rad, none.across_m, none.along_axis_m, none.mask_rad)] == [(0,)] * 4
