@@ -867,3 +867,30 @@ def test_a_coupling_that_is_missing_is_shown_as_four_numbers_that_are_taken():
     (annotation,) = fine_pointing_table.Coupling.__metadata__
     assert annotation.example == "[1.0, 0.0, 0.0, 1.0]"
     assert annotation.read(tomllib.loads(f"a = {annotation.example}")["a"]) == (1.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("rate_hz", "delay_s", "told_of"), [
+    (1000.0, 1.0, False),  # a million steps of a microsecond
+    (1000.0, 1.000001, True),
+    (1.0, 0.0, False),
+    (0.999999, 0.0, True),
+    (0.5, 2.0, True),
+])  # fmt: skip
+def test_a_step_goes_a_million_times_into_the_period_and_into_the_delay_and_no_more(rate_hz, delay_s, told_of):
+    found = [(each.key, each.reason, each.expected) for each in clock_problems("bench", rate_hz, delay_s, 1e-6)]
+    reason = "goes more than 1000000 times into the control period or the delay"
+    assert found == ([("plant_step", reason, "a step nearer to 1 / bench.rate")] if told_of else [])
+
+
+@pytest.mark.parametrize("place", range(4))
+@pytest.mark.parametrize(("large", "singular"), [(99.0, False), (101.0, True)])
+def test_one_large_number_anywhere_in_a_coupling_of_a_small_area_makes_it_singular(place, large, singular):
+    """Of condition k the squares of all numbers over the area are k + 1 / k, and here one square is nearly all."""
+    numbers = [0.0, 0.0, 0.0, 0.0]
+    numbers[place], numbers[3 - place] = large, 1.0 / large
+    assert fine_pointing_table._singular(tuple(numbers), 1.0) is singular
+    lower = (numbers[0], numbers[1], numbers[2] * 2.0, numbers[3] * 2.0)
+    assert fine_pointing_table._singular(lower, 0.5) is singular
+    numbers = [1.0, 1.0, 1.0, 1.0]
+    numbers[place] = 1.0 + 1e-4  # the area is this much, the squares four
+    assert fine_pointing_table._singular(tuple(numbers), 1.0) is True

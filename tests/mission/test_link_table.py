@@ -1137,3 +1137,38 @@ def test_rate_and_gain_of_a_code_are_its_own_by_name_and_those_given_else():
 )
 def test_a_phase_error_leaves_its_ratio_in_reach_or_not(modulation, ratio, error, reaches):
     assert counted(modulation=modulation, bit_error_ratio=ratio, phase_error_rad=error).reaches_ratio is reaches
+
+
+@pytest.mark.parametrize(("given", "needs"), [
+    ({}, False),
+    ({"mode_radius_m": math.nan, "lateral_error_m": 0.0, "angular_error_rad": 0.0}, False),
+    ({"mode_radius_m": math.nan, "lateral_error_m": -1e-9}, True),
+    ({"mode_radius_m": math.nan, "angular_error_rad": 1e-9}, True),
+    ({"mode_radius_m": 5e-6, "lateral_error_m": 0.0}, True),
+    ({"mode_radius_m": 5e-6, "angular_error_rad": 1e-9, "lateral_error_m": 1e-9, "focal_length_m": 0.5}, False),
+])  # fmt: skip
+def test_a_fibre_of_one_mode_needs_its_telescope_where_a_length_or_an_angle_is_off(given, needs):
+    found = made(Coupling, into="single-mode fibre", **({"mode_radius_m": math.nan} | given)).problems()
+    missing = 'is missing, and into = "single-mode fibre" needs it'
+    wanted = [("focal_length", missing, 'focal_length = "50 cm" would do')] if needs else []
+    assert [(each.key, each.reason, each.expected) for each in found] == wanted
+
+
+def test_links_are_read_from_a_text_in_place_of_a_file_that_need_not_be_there(tmp_path):
+    path = written(tmp_path, data_with({}))
+    text = path.read_text(encoding="utf-8")
+    other = text.replace('margin = "3 dB"', 'margin = "2.5 dB"  # agreed', 1)
+    assert other != text
+    for place in (path, tmp_path / "nowhere" / "links.toml"):
+        file = load_link(place, text=other)
+        assert (file.path, file.text, file.mission.requirement.margin_db) == (place, other, 2.5)
+        assert file.sources["requirement.margin"].text == "agreed"
+    assert load_link(path).mission.requirement.margin_db == 3.0
+    with pytest.raises(MissionError) as refused:
+        load_link(tmp_path / "nowhere" / "links.toml", text=text.replace('margin = "3 dB"', 'margin = "3 s"', 1))
+    (fault,) = refused.value.faults
+    assert (fault.key, fault.value, fault.file) == (
+        "requirement.margin",
+        '"3 s"',
+        str(tmp_path / "nowhere" / "links.toml"),
+    )

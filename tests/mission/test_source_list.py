@@ -397,3 +397,13 @@ def test_budgets_are_one_where_all_their_numbers_are():
         ),
     ]
     assert own not in others and len({hash(own), *map(hash, others)}) == 5
+
+
+@pytest.mark.parametrize(("length", "shown"), [(59, 59), (60, 60), (61, 59), (400, 59)])
+def test_a_cell_of_sixty_letters_is_told_whole_and_a_longer_one_by_its_begin(tmp_path, length, shown):
+    name = "".join(chr(ord("a") + place % 26) for place in range(length))
+    path = listed(tmp_path, f"{name},constant,1 urad,,3-sigma,each,,1")
+    with pytest.raises(SourceListError) as refused:
+        read_sources(path)
+    told_name = name[:shown] + "…" * (length > 60)
+    assert str(refused.value) == (f"{path}, row 2, {told_name}: x is empty before y; give 0 where nothing gets there")

@@ -1445,6 +1445,15 @@ def test_the_largest_values_of_windows_of_unlike_lengths_are_found_in_each():
     assert (when.tolist(), value.tolist()) == (pytest.approx([119.0, 3.0], abs=1e-3), pytest.approx([1.99, 1.0]))
 
 
+def test_a_peak_that_is_narrow_in_a_long_window_is_found_in_steps_below_a_second():
+    def peaks(time_s):
+        return np.maximum(5.0 - 25.0 * (time_s - 77.0) ** 2, 4.0 - 0.01 * (time_s - 300.0) ** 2)
+
+    when, value = events.largest(peaks, np.array([[0.0, 400.0], [200.0, 203.0]]), 0.5)
+    assert when.tolist() == pytest.approx([77.0, 203.0], abs=1e-3)
+    assert value.tolist() == pytest.approx([5.0, 4.0 - 94.09], abs=1e-4)
+
+
 def test_the_places_of_stations_far_above_the_sea_stand_each_in_their_own_row():
     """Of three unlike stations, with heights that show: the first on the equator, the second at the pole."""
     given = [
