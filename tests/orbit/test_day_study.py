@@ -1593,3 +1593,43 @@ def test_the_other_end_of_a_link_is_called_by_which_of_the_two_stands_on_the_gro
     assert view_of(low=site).partner == "satellite"
     risen = [(5.0, 9.0, "elevation mask of north", "Earth"), (20.0, 30.0, "Earth", "elevation mask of north")]
     assert view_of(*risen, slot=site).rises == view_of(*risen, low=site).rises == 1
+
+
+def test_each_run_draws_the_locks_of_its_own_and_gives_up_are_counted_within_the_span(tmp_path):
+    """Of the four parts that are granted two begin within the span; acquisition takes twice what was simulated."""
+    o = day_file(tmp_path, ALONE).mission.operations.with_value("runs", 5).with_value("relay_share", 0.5)
+    contacts = tuple(
+        orbit.Contact(*span, "Earth", "Sun") for span in ((100.0, 300.0), (900.0, 1100.0), (1200.0, 1400.0))
+    )
+    seen = SimpleNamespace(
+        pair=SimpleNamespace(span_s=(0.0, 1000.0), whole_s=(0.0, 1500.0)), duration_s=1000.0, partner="station",
+        contacts=contacts, range_m=(np.ones_like,) * 3,
+    )  # fmt: skip
+    time_s, locked = np.array([10.0, 20.0, 30.0]), np.array([True, False, True])
+    found = SimpleNamespace(simulated=SimpleNamespace(time_s=time_s, locked=locked))
+    rates = operations.RateTable((operations.Step(8e6, math.inf),))
+    way = flow.relay(o, seen, rates, 0.25, found, 2.0)
+    drawn = [np.random.Generator(np.random.Philox(key=[o.seed, run])).integers(0, 3, 4) for run in range(5)]
+    volumes = [
+        [
+            8e6 * 0.75 * max(whole - 2.0 * time_s[k], 0.0) * locked[k]
+            for whole, k in zip((100.0, 50.0), row, strict=False)
+        ]
+        for row in drawn
+    ]
+    assert len({tuple(row) for row in volumes}) > 1
+    assert way.carried_bit.tolist() == pytest.approx(np.mean(volumes, axis=0).tolist())
+    totals = np.sum(volumes, axis=1)
+    assert way.capacity_spread_bit == pytest.approx((totals.min(), totals.max()))
+    assert way.failed_contacts == pytest.approx(np.mean([np.sum(~locked[row[:2]]) for row in drawn]))
+    assert [(c.start_s, c.end_s, c.begins, c.ends) for c in way.contacts] == [
+        (100.0, 200.0, "Earth", "end of the station's share"),
+        (900.0, 950.0, "Earth", "end of the station's share"),
+    ]
+    assert (way.name, way.contact_s, way.gap_s, way.stations) == ("station", 150.0, 700.0, ())
+    dark = flow.relay(o, seen, None, 0.25, found, 2.0)
+    assert (dark.carried_bit.tolist(), dark.capacity_spread_bit) == ([0.0, 0.0], (0.0, 0.0))
+    assert (dark.contacts, dark.failed_contacts) == (way.contacts, way.failed_contacts)
+    assert dark.on_board_bit + dark.lost_bit == dark.generated_bit == o.instrument_rate_bit_s * 1000.0
+    at_once = flow.relay(o, seen, rates, 1.0, None, 2.0)  # out all the time, and locked at once
+    assert (at_once.carried_bit.tolist(), at_once.failed_contacts) == ([0.0, 0.0], 0.0)
