@@ -2571,3 +2571,68 @@ def test_the_schema_names_its_draft_and_lets_the_mirror_stand_in_another_file():
     }
     assert list(schema["properties"])[:2] == ["name", "pointing"]
     assert "transmit_power" in schema["$defs"]["Communication"]["required"]
+
+
+@pytest.mark.parametrize(("content", "most_bytes", "data"), [
+    (b"a = 1\n" + b"#" * 294, 300, {"a": 1}),
+    (b"a = 1" + b"\n" * 10_000, 20_000, {"a": 1}),
+    (b"a" * 200 + b" = 1", 300, {"a" * 200: 1}),
+    (b"a = 1" + b"0" * 399, 600, {"a": 10**399}),
+    (b"x.max = 1\n'x x'.\"xx\" = 2", 300, {"x": {"max": 1}, "x x": {"xx": 2}}),
+    (b"a = 1\r\n[b]\r\nc = '''d\r\ne'''", 300, {"a": 1, "b": {"c": "d\ne"}}),
+])  # fmt: skip
+def test_a_file_as_large_as_it_may_be_is_read_whole(content, most_bytes, data):
+    document = Document.of(content, Path("m.toml"), "mission file", most_bytes=most_bytes)
+    assert (document.data, document.faults) == (data, [])
+    leaves = [(k, v) for k, v in data.items() if not isinstance(v, dict)]
+    leaves += [(f"{k}.{n}", v) for k, inner in data.items() if isinstance(inner, dict) for n, v in inner.items()]
+    assert {s.key for s in document.statements.values() if s.kind == "key"} == {key for key, _ in leaves}
+    assert document.sha256 == hashlib.sha256(content).hexdigest()
+
+
+@pytest.mark.parametrize("parts", [50, 51])
+def test_a_key_of_fifty_parts_is_read_and_one_more_is_too_many(parts):
+    inner = ".".join(["a", "'b c'", '"d"', "e-f"] * 13)[: 10**6]
+    named = " . ".join(f"k{place}" for place in range(parts))
+    found = read_as(f"a = {{{named} = 5}}\nb = 7\n".encode(), most_bytes=2000)
+    if parts == 50:
+        assert value_of(f"{{{named} = 5}}") is not None and found.endswith(", 'b': 7} [] ")
+    else:
+        assert value_of(f"{{{named} = 5}}") is None
+        assert found.startswith("{'b': 7} ['a'] m.toml, line 1: a = {k0 . k1")
+        assert one_line(found).endswith("… holds a key of more than 50 parts expected: a table with keys of its own")
+    assert value_of(f"{{{inner} = 5}}") is None  # of quoted parts too
+
+
+@pytest.mark.parametrize(("content", "line"), [(b"\xff", 1), (b"a = 1\n# \xff\xff", 2), (b"\n\r\n\n\xe9", 4)])
+def test_the_line_of_the_first_letter_in_another_code_is_told(content, line):
+    assert read_as(content) == (f"unreadable: is not UTF-8 text (line {line}); expected the file saved again as UTF-8")
+
+
+@pytest.mark.parametrize(("content", "words"), [
+    (b"a = 1\nwords = here = 3\nwords here\n b = 2",
+     "{'a': 1, 'b': 2} ['', 'words'] m.toml, line 3: words here is neither a key with its value nor a table header "
+     'expected: key = "value", [table] or # comment; m.toml, line 2: words = here = 3 is not TOML expected: text in '
+     'quotes: words = "here = 3"'),
+    (b"[c]\na = [1,\n  [2\nb = {d = 3\n[e]\nf = 4",
+     "{'c': {}, 'e': {'f': 4}} ['c.a', 'c.b'] m.toml, line 2: c.a = [1, [2 has a bracket that is not closed "
+     "expected: a closing bracket before the next key; m.toml, line 4: c.b = {d = 3 has a bracket that is not closed "
+     "expected: a closing bracket before the next key"),
+    (b"a" * 201 + b" = 1\nb = 2",
+     f"{{'b': 2}} ['{'a' * 201}'] m.toml, line 1: {'a' * 60}… = 1 is a key of 201 characters expected: a key of the "
+     "mission file"),
+])  # fmt: skip
+def test_what_is_no_statement_is_set_aside_and_the_rest_is_read(content, words):
+    assert one_line(read_as(content, most_bytes=900).replace("\\u000a", " ")) == words
+
+
+@pytest.mark.parametrize(("count", "shown_of", "more"), [(1, 1, ""), (2, 2, ""), (50, 50, ""), (51, 50, "and 1 more")])
+def test_up_to_fifty_faults_are_told_by_file_and_line_and_of_more_how_many(count, shown_of, more):
+    """The file that was asked for comes first, whatever the names."""
+    faults = [toml.Fault(f"k{n}", str(n), n, "is wrong", "right", file="z.toml") for n in range(count, 1, -1)]
+    error = MissionError(Path("z.toml"), [toml.Fault("", "", 0, "is gone", "it", file="a.toml"), *faults])
+    lines = str(error).split("\n")
+    assert lines[0] == f"z.toml: {count} fault{'s' * (count > 1)} to correct"
+    assert [each.line for each in error.faults] == [*range(2, count + 1), 0]
+    assert sum(line.startswith(("z.toml, line", "a.toml")) for line in lines[1:]) == shown_of
+    assert (lines[-1] if more else "") == more
