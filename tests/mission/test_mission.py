@@ -2636,3 +2636,25 @@ def test_up_to_fifty_faults_are_told_by_file_and_line_and_of_more_how_many(count
     assert [each.line for each in error.faults] == [*range(2, count + 1), 0]
     assert sum(line.startswith(("z.toml, line", "a.toml")) for line in lines[1:]) == shown_of
     assert (lines[-1] if more else "") == more
+
+
+SMALL_ANGLE = Quantity("rad", "deg", above=0.0, most=0.01)
+
+
+@pytest.mark.parametrize(("rule", "value", "reason", "expected", "example"), [
+    # the number as it stands, in the unit in which it is mostly written, where that is within the bounds
+    (Quantity("m", "cm", above=0.0, most=3.0), "7", "is a number without a unit", "a length with its unit", "7 cm"),
+    (Quantity("m", "km", least=2e3), "7", "is a number without a unit", "a length with its unit", "7 km"),
+    (Quantity("m", "", least=2.0), "7", "is a number without a unit", "a length with its unit", "7 m"),
+    (SMALL_ANGLE, "7", "is a number without a unit", "an angle with its unit", "0.5 deg"),
+    (SMALL_ANGLE, "7 V", 'is in "V", another kind of quantity', "an angle with its unit", "0.5 deg"),
+    (SMALL_ANGLE, "0 deg", "is not above 0 deg", "an angle with its unit, above 0 deg, at most 0.573 deg", "0.5 deg"),
+    (SMALL_ANGLE, "1 deg", "is above 0.573 deg", "an angle with its unit, above 0 deg, at most 0.573 deg", "0.5 deg"),
+])  # fmt: skip
+def test_an_example_of_a_value_is_one_that_would_be_taken(rule, value, reason, expected, example):
+    with pytest.raises(UnitError) as refused:
+        rule.read(value)
+    error = refused.value
+    assert (error.reason, error.expected, error.example) == (reason, expected, example)
+    assert str(error) == f'"{value}" {reason}; expected {expected}, for example "{example}"'
+    assert rule.out_of_bounds(rule.read(example)) == ""

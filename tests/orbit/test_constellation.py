@@ -697,3 +697,14 @@ def test_satellites_that_are_sampled_in_steps_of_their_own_are_each_seen_and_sta
     assert sum(row[2] == 0.0 for row in rows) > 3 and {row[1] for row in rows} == {0, 1, 2}
     assert {row[0] for row in rows} == {0, 1, 2} and done == [1, 2, 3]
     assert len({constellation.coarse_step_s(each.orbit, 0.0) for each in own}) == 2
+
+
+def test_the_use_of_terminals_counts_by_the_span_wherever_it_begins():
+    """Of 400 s the two relays of three terminals are busy for 300 s and 600 s, the stations of 1 and 5 for 100 s."""
+    plan = SimpleNamespace(
+        span_s=(1600.0, 2000.0), terminals=3, station_terminals=(1, 5),
+        by_relay=SimpleNamespace(busy_s=np.array([300.0, 600.0])),
+        by_station=SimpleNamespace(busy_s=np.array([100.0, 100.0])),
+    )  # fmt: skip
+    assert constellation.ConstellationPlan.use.fget(plan).tolist() == [0.25, 0.5]
+    assert constellation.ConstellationPlan.station_use.fget(plan).tolist() == [0.25, 0.05]

@@ -1474,3 +1474,24 @@ def test_the_places_of_stations_far_above_the_sea_stand_each_in_their_own_row():
     assert rows.rise.tolist() == pytest.approx([0.0, 1.0, -math.sin(0.6)], abs=1e-12)
     none = StationRows.of([], EPOCH)
     assert [part.shape for part in (none.longitude_rad, none.across_m, none.along_axis_m, none.mask_rad)] == [(0,)] * 4
+
+
+def test_two_satellites_half_a_metre_apart_are_at_two_places_and_where_they_are_at_one_says_the_time():
+    """The one stands still; the other passes it at 20 s, and otherwise stays ahead of it."""
+    still = states_along("still", lambda t: np.stack((7e6 + 0.0 * t, 0.0 * t, 0.0 * t)))
+    passing = states_along("passing", lambda t: np.stack((7e6 + 0.0 * t, 0.025 * (t - 20.0), 0.0 * t)))
+    found = sight(still, passing, [0.0, 10.0, 40.0, 60.0])
+    assert found.range_m.tolist() == pytest.approx([0.5, 0.25, 0.5, 1.0], rel=1e-9)
+    assert found.range_rate_m_s.tolist() == pytest.approx([-0.025, -0.025, 0.025, 0.025], rel=1e-9)
+    assert found.direction[1].tolist() == pytest.approx([-1.0, -1.0, 1.0, 1.0])
+    for pair, names in (((still, passing), "still and passing"), ((passing, still), "passing and still")):
+        with pytest.raises(OrbitError) as refused:
+            sight(*pair, [0.0, 40.0, 20.0, 60.0])
+        assert str(refused.value) == f"{names} are at the same place at 20 s; give two different orbits"
+
+
+def test_a_span_is_as_long_as_its_end_is_from_its_start_however_late_it_begins():
+    assert coarse_times((5e8, 5e8 + 480.0), 60.0).tolist() == [5e8 + 60.0 * k for k in range(9)]
+    assert coarse_times((-5e8, -5e8 + 30.0), 60.0).tolist() == [-5e8 + 7.5 * k for k in range(5)]
+    with pytest.raises(OrbitError, match=r"more than 5e[+]06 of them"):
+        coarse_times((-2e8, 2e8), 60.0)

@@ -1021,3 +1021,16 @@ def test_plans_of_nothing_of_equal_starts_and_of_names_that_steer_are_written_wh
 def test_where_nothing_arrived_no_share_has_a_latency():
     none = operations.Latency(np.zeros(0), np.zeros(0), np.zeros(0), 5.0)
     assert [none.quantile(share) for share in (0.0, 0.5)] == [math.inf, math.inf]
+
+
+@pytest.mark.parametrize(("range_m", "taken"), [
+    (0.0, True), (-0.0, True), (1e-9, True), (math.inf, True), (-1e-9, False), (-0.5, False), (math.nan, False),
+])  # fmt: skip
+def test_a_step_reaches_at_least_nothing_and_its_place_is_told(range_m, taken):
+    steps = (Step(9.0, 4.0), Step(5.0, range_m))
+    if taken:
+        assert RateTable(steps).steps == steps
+        return
+    with pytest.raises(OperationsError) as refused:
+        RateTable(steps)
+    assert str(refused.value) == (f"the largest range of step 1 is {range_m:g} m; give at least 0 m, inf allowed")
