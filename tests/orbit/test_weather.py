@@ -322,12 +322,10 @@ def test_skies_of_sites_and_months_unlike_each_other(found, expected):
     assert list(found()) == pytest.approx(expected, rel=1e-6, abs=0.0, nan_ok=True)
 
 
-@pytest.mark.parametrize("count", [3, 40])
-def test_places_on_opposite_sides_of_the_earth_are_half_a_turn_apart(count):
-    """Among many such pairs are those whose haversine comes out a last digit above 1."""
-    for k in range(count):
-        latitude, longitude = -1.5 + 3.0 * k / count, 0.1 * k
-        pair = [Site("a", latitude, longitude, (0.5,)), Site("b", -latitude, longitude - math.pi, (0.5,))]
+def test_places_on_opposite_sides_of_the_earth_are_half_a_turn_apart():
+    """Among these latitudes are some whose haversine comes out a last digit above 1."""
+    for latitude in (-1.495, -1.465, -1.455, -1.451, -1.441, -1.437, -1.399, -1.39, -0.5, 0.0, 0.7):
+        pair = [Site("a", latitude, 0.0, (0.5,)), Site("b", -latitude, -math.pi, (0.5,))]
         found = skies.distances_m([*pair, Site("c", math.pi / 2.0, 0.0, (0.5,))])
         # near the half turn an angle is known to the root of the last digit
         assert found[0, 1] == found[1, 0] == pytest.approx(math.pi * EARTH_RADIUS_M, abs=1.0)
