@@ -323,7 +323,6 @@ def test_skies_of_sites_and_months_unlike_each_other(found, expected):
 
 
 def test_places_on_opposite_sides_of_the_earth_are_half_a_turn_apart():
-    """Among these latitudes are some whose haversine comes out a last digit above 1."""
     for latitude in (-1.495, -1.465, -1.455, -1.451, -1.441, -1.437, -1.399, -1.39, -0.5, 0.0, 0.7):
         pair = [Site("a", latitude, 0.0, (0.5,)), Site("b", -latitude, -math.pi, (0.5,))]
         found = skies.distances_m([*pair, Site("c", math.pi / 2.0, 0.0, (0.5,))])
