@@ -1383,6 +1383,8 @@ def test_a_version_below_or_above_that_of_several_axes_is_none(tmp_path, version
     path.write_text(edited(("version = 2", f"version = {version}")), encoding="utf-8")
     fault = only_fault(lambda: load_coupled_mirror(path))
     assert fault.key.endswith("version") and fault.reason == "is no version of a mirror of several axes"
+
+
 @pytest.mark.parametrize(("place", "refused"), [((0.03,), True), ((0.1, 0.2), False), ((0.1, 0.2, 0.3), True)])
 def test_a_place_on_a_mirror_has_two_coordinates_no_fewer_and_no_more(place, refused):
     found = list(made(OutputTable, quantity="displacement", position_m=place).problems())

@@ -2558,6 +2558,8 @@ def test_a_list_of_keys_may_have_just_the_most_items():
     assert KeyList(None, most=2).read(["a", "b"]) == ("a", "b")
     with pytest.raises(ProblemsError):
         KeyList(None, most=2).read(["a", "b", "c"])
+
+
 def test_the_schema_names_its_draft_and_lets_the_mirror_stand_in_another_file():
     schema = mission_schema()
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"

@@ -1369,6 +1369,8 @@ def test_no_wavelength_but_one_above_nothing_has_a_doppler_shift(wavelength_m):
 def test_a_span_whose_ends_are_no_numbers_or_turned_holds_no_time(span_s):
     with pytest.raises(OrbitError, match=f"^the span from {span_s[0]:g} s to {span_s[1]:g} s holds no time; give a"):
         coarse_times(span_s, 60.0)
+
+
 def states_along(name, position_m):
     """An orbit without a sum behind it: its places by a function of time, its velocities by differences."""
 
