@@ -164,7 +164,8 @@ def test_tdms_starts_differ(tmp_path, late_us, offset_s, together):
         check(read_recording(path, "drive", "output"), ("bench/drive", "bench/output"))
     else:
         message = refusal(path, "drive", "output")
-        assert f"'bench/output' starts {abs(late_us) * 1e-6:g} s apart from 'bench/drive'" in message
+        first, last = sorted(begins, reverse=late_us < 0)
+        assert f"'bench/{last}' starts {abs(late_us) * 1e-6:g} s apart from 'bench/{first}'" in message
         assert "one step is 0.0005 s); record both in one task, or cut them" in message
     tdms(path, step=0.0, more=begins)
     check(read_recording(path, "drive", "output", RATE_HZ), ("bench/drive", "bench/output"))
@@ -2554,3 +2555,15 @@ def test_a_text_is_laid_out_as_its_last_lines_are_however_many_others_stand_befo
     assert found.names == tuple(header.split(","))
     source = text_format.TextSource(tmp_path / "a.csv")
     assert [values[-1] for values in source.load([0, 1])] == [209.5, -209.0] and source.place(2) == "line 254"
+
+
+@pytest.mark.parametrize("offsets_s", [(0.0, 0.0004, -0.0004), (-0.0004, 0.0, 0.0004), (0.0004, 0.0, -0.0004)])
+def test_channels_that_start_apart_from_each_other_are_refused_in_any_order(tmp_path, offsets_s):
+    """By 0.8 of a step of 1 ms, although each starts within half a step of the one that starts between them."""
+    path = tmp_path / "a.tdms"
+    known = {"wf_increment": 1e-3, "wf_start_time": np.datetime64("2026-01-01T12:00:00.000000")}
+    with TdmsWriter(path) as file:
+        for name, offset in zip("abc", offsets_s, strict=True):
+            file.write_segment([ChannelObject("g", name, DRIVE, {**known, "wf_start_offset": offset})])
+    last, first = (f"g/{'abc'[choose(range(3), key=offsets_s.__getitem__)]}" for choose in (max, min))
+    assert f"'{last}' starts 0.0008 s apart from '{first}'" in refusal(path, "a", ("b", "c"))

@@ -846,3 +846,15 @@ def test_fewer_or_more_places_and_signs_than_two_outputs_are_refused(tmp_path, l
     np.savez(tmp_path / "a.npz", u=DRIVE[:, 0], y=OUTPUT[:, 0], x=-2.0 * OUTPUT[:, 0], fs=RATE_HZ)
     entry = '[recording.a]\nfile = "a.npz"\ninput = "u"\noutput = ["y", "x"]\n'
     assert words in refusal(tmp_path, f"{line}\n{entry}")
+
+
+@pytest.mark.parametrize("order", [("one", "two"), ("two", "one")])
+def test_recordings_of_other_channels_are_refused_whichever_comes_first(tmp_path, order):
+    for name, drives in (("one", 1), ("two", 2)):
+        np.savez(
+            tmp_path / f"{name}.npz", **{f"u{k}": np.roll(DRIVE[:, 0], 9 * k) for k in range(drives)}, y=OUTPUT[:, 0]
+        )
+    entry = '[recording.{0}]\nfile = "{0}.npz"\ninput = [{1}]\noutput = "y"\nrate = "1 kHz"\n'
+    of = {"one": entry.format("one", '"u0"'), "two": entry.format("two", '"u0", "u1"')}
+    with pytest.raises(RecordingError, match="; name the same channels in each recording"):
+        read_list(write_list(tmp_path, "".join(of[name] for name in order)))

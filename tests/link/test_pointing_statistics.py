@@ -704,3 +704,13 @@ def test_an_axis_that_moves_has_a_velocity_and_one_that_does_not_has_none(rms, v
     jitter = Jitter((0.0, 0.0), tuple(each * URAD for each in rms))
     with pytest.raises(ValueError, match=f"^axis {axis} has a jitter rms of .*; give both above 0, or both 0"):
         pf.fades(jitter, velocity, THETA, 3.0)
+
+
+@pytest.mark.parametrize(("freq", "share"), [([5.0, 10.0], 1.0), ([5.0, 7.0, 10.0], 1.0), ([4.0, 5.0, 10.0], None)])
+def test_a_grid_with_a_point_at_half_its_highest_frequency_has_all_of_the_top_octave(freq, share):
+    """Of a density of one value: its speed rises as the square of the frequency, and is straight between the points."""
+    motion = pf.motion_of_spectrum(freq, np.full((2, len(freq)), 1e-12))
+    if share is None:
+        below, above = (4.0**2 + 5.0**2) / 2, 5.0 * (5.0**2 + 10.0**2) / 2
+        share = above / (below + above)
+    assert motion.top_octave_share == pytest.approx([share, share], rel=1e-12)

@@ -1552,7 +1552,7 @@ def test_a_way_of_two_runs_has_the_mean_of_both_and_the_store_of_the_first():
     assert none.failed_contacts == 0.0
 
 
-def view_of(*contacts, slot=None, low=None):
+def spanned(*contacts, slot=None, low=None):
     """The view of a span from 0 to 1000 s, with contacts of start, end, and what begins and ends them."""
     sides = {"leo": low or SimpleNamespace(), "geo": slot or SimpleNamespace()}
     ends = {side: SimpleNamespace(orbit=own, name=side) for side, own in sides.items()}
@@ -1568,14 +1568,14 @@ def view_of(*contacts, slot=None, low=None):
 def test_the_median_contact_is_that_of_those_that_no_end_of_the_span_cuts():
     cut = [(0.0, 200.0, "start of the span", "Earth"), (810.0, 1000.0, "Earth", "end of the span")]
     whole = [(210.0, 280.0, "Earth", "range"), (300.0, 330.0, "range and Earth", "Earth"), (400.0, 455.0, "Sun", "Sun")]
-    v = view_of(cut[0], *whole, cut[1])
+    v = spanned(cut[0], *whole, cut[1])
     assert (v.median_s, v.contact_s, v.visible_share, v.duration_s) == (55.0, 545.0, 0.545, 1000.0)
     assert (v.days, v.gap_s) == (1000.0 / 86400.0, 355.0)
     assert v.rises == 4  # the one that the Sun begins is no rise
-    assert view_of(cut[0], *whole).median_s == view_of(*whole, cut[1]).median_s == 55.0
-    assert view_of(*whole[:2]).median_s == 50.0
+    assert spanned(cut[0], *whole).median_s == spanned(*whole, cut[1]).median_s == 55.0
+    assert spanned(*whole[:2]).median_s == 50.0
     for given in ([], cut, cut[:1], cut[1:], [(0.0, 1000.0, "start of the span", "end of the span")]):
-        assert math.isnan(view_of(*given).median_s)
+        assert math.isnan(spanned(*given).median_s)
     largest = [
         v.largest(name)
         for name in (
@@ -1588,11 +1588,11 @@ def test_the_median_contact_is_that_of_those_that_no_end_of_the_span_cuts():
 
 def test_the_other_end_of_a_link_is_called_by_which_of_the_two_stands_on_the_ground():
     site = orbit.GroundSite(orbit.Station("north", 1.1, 0.3, 100.0, 0.1), orbit.Epoch(EPOCH))
-    assert view_of().partner == "relay"
-    assert view_of(slot=site).partner == "station"
-    assert view_of(low=site).partner == "satellite"
+    assert spanned().partner == "relay"
+    assert spanned(slot=site).partner == "station"
+    assert spanned(low=site).partner == "satellite"
     risen = [(5.0, 9.0, "elevation mask of north", "Earth"), (20.0, 30.0, "Earth", "elevation mask of north")]
-    assert view_of(*risen, slot=site).rises == view_of(*risen, low=site).rises == 1
+    assert spanned(*risen, slot=site).rises == spanned(*risen, low=site).rises == 1
 
 
 def test_each_run_draws_the_locks_of_its_own_and_gives_up_are_counted_within_the_span(tmp_path):

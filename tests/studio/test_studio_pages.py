@@ -506,7 +506,7 @@ def test_the_figures_of_a_campaign_keep_what_was_chosen(session, tab, monkeypatc
     panel._show(found_figures())
     assert (panel._chosen.value, panel._drawn.visible, len(drawn)) == (None, False, before)
     assert (panel._rows.text, panel._headline.text) == ("Of 3 rows so far", "So far")
-    panel._clear()
+    panel._clear("No row is in the ledger yet.")
     assert (panel._rows.text, panel._headline.visible) == ("No row is in the ledger yet.", False)
 
 
@@ -2026,7 +2026,7 @@ div.runs-results
     link[href=/results/5/0] Save x.ledger
 div
   section.runs-figures[aria-label=Figures of the campaign]
-    div.runs-rows No row is in the ledger yet.
+    div.runs-rows Reading the ledger ...
   timer 1
 code.mono.runs-command microrad run 'a b'
 """,
@@ -3112,7 +3112,7 @@ def test_figures_that_were_hidden_stay_hidden_while_their_campaign_goes_on(sessi
     ):
         shown(card, replace(job, **more), Others(newest=True, latest=True))
         assert (panel.open, card.figures.text) == (False, "Show its figures")
-    assert card._panel is panel and texts(card.place).count("No row is in the ledger yet.") == 1
+    assert card._panel is panel and texts(card.place).count("Reading the ledger ...") == 1
     card._toggle()
     assert (panel.open, card.figures.text) == (True, "Hide its figures")
 
@@ -3172,3 +3172,17 @@ def test_each_page_copies_the_command_that_computes_what_it_shows(inner, tab, mo
     words = "Copy as Python" if python else "Copy as command"
     press(next(each for each in tab.content.descendants() if getattr(each, "text", "") == words))
     assert copied == [(getattr(commands, command)(Path("sub/m n.toml")), python)]
+
+
+@pytest.mark.parametrize("page", [control.ControlPage, mission._Page])
+def test_a_command_of_a_mission_that_is_not_saved_is_copied_with_a_warning(session, tab, monkeypatch, page):
+    copied, notes = [], []
+    monkeypatch.setattr(layout, "_copy", lambda action, python: copied.append(action))
+    monkeypatch.setattr(layout.ui, "notify", lambda words, **settings: notes.append((words, settings["type"])))
+    page(session)
+    press(buttons(tab.content)["Copy as command"])
+    session.set(LEO, "6 cm")
+    press(buttons(tab.content)["Copy as Python"])
+    words = "The command reads the file: save the mission first, for the same numbers."
+    of = (commands.design if page is control.ControlPage else commands.budget)(Path("leo-geo.toml"))
+    assert (copied, notes) == ([of, of], [(words, "warning")])

@@ -310,7 +310,7 @@ def _check_channels(
 ) -> None:
     """Raises RecordingError if positions or signs are not those of the channels."""
     inputs, outputs = recordings[0].drive.shape[1], recordings[0].output.shape[1]
-    if inputs > 1 or outputs > 1:
+    if any(r.drive.shape[1] > 1 or r.output.shape[1] > 1 for r in (*recordings, *validation)):
         with _named(str(path)):
             check_together(recordings, validation)
     if root.positions is not None and len(root.positions) != outputs:

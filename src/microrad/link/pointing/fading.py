@@ -85,7 +85,7 @@ def motion_of_spectrum(freq_hz: ArrayLike, psd_rad2_hz: ArrayLike) -> SpectralMo
     total = np.trapezoid(speed, freq, axis=-1)
     split = 0.5 * freq[-1]
     top = freq[freq > split]
-    if freq[0] < split:
+    if freq[0] <= split:
         top = np.concatenate(([split], top))
     in_top = np.array([np.trapezoid(np.interp(top, freq, one), top) for one in speed])
     share = np.divide(in_top, total, out=np.zeros(2), where=total > 0.0)

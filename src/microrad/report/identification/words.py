@@ -299,11 +299,10 @@ def roots(linear: LinearFit) -> list[Root]:
         for value, error in pairs:
             if value.imag < 0.0:
                 continue
-            size = abs(value) or math.nan
             freq, real = abs(value) / (2 * math.pi), value.imag == 0.0
-            damping_error = 0.0 if real else error / size
+            damping, damping_error = (-value.real / abs(value), error / abs(value)) if value else (1.0, 0.0)
             inside = low <= freq <= high
-            found.append(Root(kind, freq, error / (2 * math.pi), -value.real / size, damping_error, inside))
+            found.append(Root(kind, freq, error / (2 * math.pi), damping, 0.0 if real else damping_error, inside))
     return found
 
 

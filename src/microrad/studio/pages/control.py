@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from nicegui import background_tasks, ui
@@ -53,7 +52,7 @@ class ControlPage:
         self.question, self.round, self.filling = 0, 0, False
         self.found: dict[str, Controller | str] = {}
         self.plots: dict[str, Any] = {}
-        layout.copy_buttons(lambda: commands.design(Path(session.name_of(session.draft.path))))
+        layout.copy_buttons(lambda: commands.design(layout.file_of(session)))
         self.words = ui.label().classes("no kept").props('role="alert"')
         self._all()
         self._one()

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 from nicegui import ui
@@ -61,7 +60,7 @@ class _Page:
         self.session = session
         with ui.row().classes("mission-tools"):
             file_buttons(session, self._other)
-            layout.copy_buttons(lambda: commands.budget(Path(session.name_of(session.draft.path))))
+            layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
         with ui.element("div").classes("mission-columns"):
             with ui.element("nav").classes("mission-tables").props('aria-label="Tables"'):
                 self.search = ui.input("Find a key", on_change=self._search).props(

@@ -245,7 +245,7 @@ class CampaignPanel:
         self.place = ui.element("section").classes("runs-figures").props('aria-label="Figures of the campaign"')
         self.place.visible = False
         with self.place:
-            self._rows = ui.label("Reading the ledger ...").classes("runs-rows")
+            self._rows = ui.label().classes("runs-rows")
             self._headline = ui.label().classes("kept")
             with ui.element("div").classes("runs-plot") as self._drawn:
                 self._chosen = ui.select({}, label="Shown", on_change=self._draw).props("dense outlined")
@@ -253,7 +253,7 @@ class CampaignPanel:
             self._told = Blocks()
             self._fault = ui.label().classes("no kept")
         self._timer = ui.timer(_LOOK_S, self._look, active=False)
-        self._clear()
+        self._clear("Reading the ledger ...")
 
     @property
     def open(self) -> bool:
@@ -272,17 +272,17 @@ class CampaignPanel:
         self._last = live
         found = await in_thread(self.place, figures, live)
         if found is None:
-            self._clear()
+            self._clear("No row is in the ledger yet.")
         else:
             self._show(found)
         self._fault.text = live.fault
         self._fault.visible = bool(live.fault)
         self._rows.visible = found is not None or not live.fault
 
-    def _clear(self) -> None:
-        """Say that there are no rows yet."""
+    def _clear(self, said: str) -> None:
+        """Say why there are no rows to show."""
         self._found = None
-        self._rows.text = "No row is in the ledger yet."
+        self._rows.text = said
         for each in (self._headline, self._drawn, self._told, self._fault):
             each.visible = False
 

@@ -64,16 +64,15 @@ class TdmsSource(Container):
         starts = {self.names[i]: start for i in indices if (start := self._starts[self.names[i]])}
         if len(starts) < 2 or not steps:
             return
-        first, (begin, offset) = next(iter(starts.items()))
-        for name, (other, other_offset) in starts.items():
-            apart = abs(float((other - begin) / np.timedelta64(1, "ns")) * 1e-9 + other_offset - offset)
-            # Times are kept to a microsecond.
-            if apart > 0.5 * min(steps) + 1e-6:
-                raise RecordingError(
-                    f"{self.path}: '{name}' starts {apart:.6g} s apart from '{first}' (wf_start_time, "
-                    f"wf_start_offset; one step is {min(steps):.6g} s); record both in one task, or cut them to "
-                    "their common time."
-                )
+        begin = next(iter(starts.values()))[0]
+        times = {name: float((at - begin) / np.timedelta64(1, "ns")) * 1e-9 + off for name, (at, off) in starts.items()}
+        first, last = (choose(times, key=times.__getitem__) for choose in (min, max))
+        apart = times[last] - times[first]
+        if apart > 0.5 * min(steps) + 1e-6:  # times are kept to a microsecond
+            raise RecordingError(
+                f"{self.path}: '{last}' starts {apart:.6g} s apart from '{first}' (wf_start_time, wf_start_offset; one "
+                f"step is {min(steps):.6g} s); record both in one task, or cut them to their common time."
+            )
 
 
 class _Listener(logging.Handler):
