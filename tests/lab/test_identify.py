@@ -1086,21 +1086,16 @@ def test_a_mirror_file_of_plays_is_line_by_line_what_was_found():
     ]
 
 
-def test_a_mirror_file_of_eq_3_that_falls_has_its_signs_and_their_errors_turned():
-    """d1, epsilon and beta are counted the other way, and so is what they have to do with the others."""
-    sizes = np.array([4e-6, 2e-7, 3e-6, 5e-5, 2.0, 1.5])
-    between = np.eye(6)
-    between[0, 1] = between[1, 0] = 0.5
-    between[0, 2] = between[2, 0] = -0.25
-    between[4, 5] = between[5, 4] = 0.75
-    fit = BoucWenFit(
-        model=BoucWen(-8e-5, 3e-7, 4e-5, 5e-4, 40.0, 30.0, 777.0),
+def eq_3_fit(sign, covariance, not_identified):
+    """A fit of Eq. 3 that rises (1) or falls (-1) with the drive."""
+    return BoucWenFit(
+        model=BoucWen(8e-5 * sign, 3e-7, -4e-5 * sign, 5e-4, 40.0, 30.0, 777.0),
         offsets_rad=(0.0,),
         units=Units(),
-        covariance=sizes[:, None] * between * sizes,
+        covariance=covariance,
         colour_inflation=1.0,
         condition_number=1.0,
-        not_identified=(("delta", "of a reason"), ("d2", "of another")),
+        not_identified=not_identified,
         residual_rms_percent=0.1,
         start_rms_percent=(0.1,),
         agreeing_starts=1,
@@ -1110,6 +1105,16 @@ def test_a_mirror_file_of_eq_3_that_falls_has_its_signs_and_their_errors_turned(
         constrained=False,
         samples_used=987,
     )
+
+
+def test_a_mirror_file_of_eq_3_that_falls_has_its_signs_and_their_errors_turned():
+    """d1, epsilon and beta are counted the other way, and so is what they have to do with the others."""
+    sizes = np.array([4e-6, 2e-7, 3e-6, 5e-5, 2.0, 1.5])
+    between = np.eye(6)
+    between[0, 1] = between[1, 0] = 0.5
+    between[0, 2] = between[2, 0] = -0.25
+    between[4, 5] = between[5, 4] = 0.75
+    fit = eq_3_fit(-1, sizes[:, None] * between * sizes, (("delta", "of a reason"), ("d2", "of another")))
     text = mirror_file_text(static_identification(fit), 'the "one"')
     lines = text.split("\n")
     assert lines[14:19] == [
@@ -1703,23 +1708,7 @@ def test_a_mirror_file_of_a_model_that_was_not_chosen_has_the_score_and_the_warn
         residual_rms_percent=0.1,
         samples_used=1300,
     )
-    eq_3 = BoucWenFit(
-        model=BoucWen(-8e-5 * sign, 3e-7, 4e-5 * sign, 5e-4, 40.0, 30.0, 777.0),
-        offsets_rad=(0.0,),
-        units=Units(),
-        covariance=np.zeros((6, 6)),
-        colour_inflation=1.0,
-        condition_number=1.0,
-        not_identified=(),
-        residual_rms_percent=0.1,
-        start_rms_percent=(0.1,),
-        agreeing_starts=1,
-        slope_after_reversal_rad_per_v=1e-6,
-        lowest_slope_rad_per_v=1e-6,
-        admissible=True,
-        constrained=False,
-        samples_used=987,
-    )
+    eq_3 = eq_3_fit(-sign, np.zeros((6, 6)), ())
     scores = (
         predictions.Score("prandtl_ishlinskii", 0.1, 1.0, 0.5, 5.0),
         predictions.Score("bouc_wen", 0.2, 2.0, 0.7, 7.0),

@@ -391,18 +391,6 @@ def test_arrays_in_an_order_of_their_own_with_a_part_that_cuts_through_a_period(
             "their axes in order (--axes).",
         ),
         (
-            {"u": FEW[:225], "y": SEEN},
-            AXES,
-            "'y' has 230 samples, where the drives, 'u' in {path}, have 225; give arrays that were recorded together, "
-            "and their axes in order (--axes).",
-        ),
-        (
-            {"u": FEW[:, :, :4], "y": SEEN},
-            AXES,
-            "'y' has 5 realisations, where the drives, 'u' in {path}, have 4; give arrays that were recorded together, "
-            "and their axes in order (--axes).",
-        ),
-        (
             {"u": FEW, "y": SEEN[:225]},
             AXES,
             "'y' has 225 samples, where the drives, 'u' in {path}, have 230; give arrays that were recorded together, "
@@ -449,6 +437,18 @@ def test_arrays_in_an_order_of_their_own_with_a_part_that_cuts_through_a_period(
             "samples",
             "--axes (axes) is 'samples'; give a sequence of words: name each axis of the array in its order, out of "
             "samples, channels, realisations, periods.",
+        ),
+        (
+            {"u": FEW[:225], "y": SEEN},
+            AXES,
+            "'y' has 230 samples, where the drives, 'u' in {path}, have 225; give arrays that were recorded together, "
+            "and their axes in order (--axes).",
+        ),
+        (
+            {"u": FEW[:, :, :4], "y": SEEN},
+            AXES,
+            "'y' has 5 realisations, where the drives, 'u' in {path}, have 4; give arrays that were recorded together, "
+            "and their axes in order (--axes).",
         ),
     ],
 )

@@ -2342,17 +2342,22 @@ def test_the_unit_that_is_stated_of_a_time_goes_before_that_in_brackets():
     assert (time_unit("time (ms)", "us"), time_unit("time (ms)", "")) == ("us", "ms")
 
 
+def saved(file, name, arrays):
+    """Arrays into a file in the format that a name ends with."""
+    if name.lower().endswith(".npz"):
+        np.savez(file, **arrays)
+    elif name.lower().endswith(".mat"):
+        savemat(file, arrays)
+    else:
+        with h5py.File(file, "w") as made:
+            for key, values in arrays.items():
+                made[key] = values
+
+
 @pytest.mark.parametrize("name", ["a.npz", "a.mat", "a.h5"])
 def test_an_array_that_is_called_t_is_no_time_where_it_is_the_input(tmp_path, name):
     path, arrays = tmp_path / name, {"t": 40 + DRIVE, "y": OUTPUT}
-    if name == "a.npz":
-        np.savez(path, **arrays)
-    elif name == "a.mat":
-        savemat(path, arrays)
-    else:
-        with h5py.File(path, "w") as file:
-            for key, values in arrays.items():
-                file[key] = values
+    saved(path, name, arrays)
     read = read_recording(path, "t", "y", RATE_HZ)
     np.testing.assert_array_equal(read.drive[:, 0], 40 + DRIVE)
     assert (read.rate_hz, read.input_names, read.findings[0].kind) == (RATE_HZ, ("t",), "unexcited")
@@ -2372,7 +2377,7 @@ def test_the_time_of_a_channel_is_the_one_of_its_length_whatever_stands_first(tm
 def test_a_rate_and_a_step_of_one_file_that_contradict_each_other_are_refused(tmp_path, write):
     path = tmp_path / ("a.npz" if write is np.savez else "a.mat")
     arrays = {"u": DRIVE, "y": OUTPUT, "Fs": 400.0, "dt": 0.005}
-    np.savez(path, **arrays) if write is np.savez else savemat(path, arrays)
+    saved(path, path.name, arrays)
     told = refusal(path, "u", "y")
     assert "two sample rates: 400 Hz (Fs = 400 Hz) and 200 Hz (dt = 0.005 s), 0.5 times as much" in told
     assert read_recording(write_agreeing(path, arrays), "u", "y").rate_hz == 400.0
@@ -2381,7 +2386,7 @@ def test_a_rate_and_a_step_of_one_file_that_contradict_each_other_are_refused(tm
 def write_agreeing(path, arrays):
     """The same arrays with a step that is that of the rate."""
     arrays = {**arrays, "dt": 0.0025}
-    np.savez(path, **arrays) if path.suffix == ".npz" else savemat(path, arrays)
+    saved(path, path.name, arrays)
     return path
 
 
@@ -2421,14 +2426,7 @@ def test_a_unit_in_bytes_is_read_as_utf_8(tmp_path):
 def test_the_end_of_a_name_may_have_letters_of_either_case(tmp_path, name):
     content = io.BytesIO()
     arrays = {"drive": DRIVE, "output": OUTPUT, "fs": RATE_HZ}
-    if name == "A.NPZ":
-        np.savez(content, **arrays)
-    elif name == "A.Mat":
-        savemat(content, arrays)
-    else:
-        with h5py.File(content, "w") as file:
-            for key, values in arrays.items():
-                file[key] = values
+    saved(content, name, arrays)
     (tmp_path / name).write_bytes(content.getvalue())
     check(read_recording(tmp_path / name, "drive", "output"))
 

@@ -2244,15 +2244,27 @@ def test_a_legend_above_that_is_wider_than_its_panel_ends_where_the_panel_does()
     assert key.x + key.width / 2.0 == pytest.approx((placed.inner[0] + placed.inner[2]) / 2.0)
 
 
-def test_panels_that_share_an_axis_without_a_title_have_that_of_the_lowest_and_of_the_first():
-    sheet, (high, _, low) = grid(4.0, 4.0, 3, 1, share_x=True)
-    high.x.title, low.x.title = "first (s)", "last (s)"
-    assert [placed.x_title for placed in layout(sheet).placed] == ["first (s)", "last (s)", "last (s)"]
-    sheet, (left, _, right) = grid(6.0, 2.0, 1, 3, share_y=True)
-    left.y.title, right.y.title = "first (m)", "last (m)"
-    assert [placed.y_title for placed in layout(sheet).placed] == ["first (m)", "first (m)", "last (m)"]
+@pytest.mark.parametrize(
+    ("titles", "in_rows", "in_columns"),
+    [
+        (("first", "", "last"), ["first", "last", "last"], ["first", "first", "last"]),
+        (("first", "second", ""), ["first", "second", "second"], ["first", "second", "first"]),
+        (("", "second", "last"), ["last", "second", "last"], ["second", "second", "last"]),
+    ],
+)
+def test_panels_that_share_an_axis_without_a_title_have_that_of_the_lowest_and_of_the_first(
+    titles, in_rows, in_columns
+):
+    sheet, panels = grid(4.0, 4.0, 3, 1, share_x=True)
+    for panel, title in zip(panels, titles, strict=True):
+        panel.x.title = title
+    assert [placed.x_title for placed in layout(sheet).placed] == in_rows
+    sheet, panels = grid(6.0, 2.0, 1, 3, share_y=True)
+    for panel, title in zip(panels, titles, strict=True):
+        panel.y.title = title
+    assert [placed.y_title for placed in layout(sheet).placed] == in_columns
     sheet.share_y = False
-    assert [placed.y_title for placed in layout(sheet).placed] == ["first (m)", "", "last (m)"]
+    assert [placed.y_title for placed in layout(sheet).placed] == [*titles]
 
 
 @pytest.mark.parametrize(("columns", "title"), [(1, "kind"), (2, "A title kind")])
@@ -2263,15 +2275,6 @@ def test_the_legend_of_a_panel_has_the_panels_title_where_there_are_others(colum
     panels[0].title, panels[0].legend = "A title", Legend("above", title="kind")
     (key,) = turned(sheet)["keys"]
     assert key["title"] == title
-
-
-def test_panels_that_share_an_axis_pass_over_those_that_have_no_title():
-    sheet, (first, second, _) = grid(4.0, 4.0, 3, 1, share_x=True)
-    first.x.title, second.x.title = "first (s)", "second (s)"
-    assert [placed.x_title for placed in layout(sheet).placed] == ["first (s)", "second (s)", "second (s)"]
-    sheet, (_, middle, right) = grid(6.0, 2.0, 1, 3, share_y=True)
-    middle.y.title, right.y.title = "second (m)", "last (m)"
-    assert [placed.y_title for placed in layout(sheet).placed] == ["second (m)", "second (m)", "last (m)"]
 
 
 @pytest.mark.parametrize(

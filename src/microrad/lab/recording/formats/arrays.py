@@ -196,7 +196,7 @@ class ArraySource(Container):
         """
         if isinstance(wanted, str) and wanted not in self.names:
             wanted = re.sub(r"\s*,\s*", ", ", wanted)
-            extra = None if wanted in self.names else indexed(self, self.variables, wanted)
+            extra = indexed(self, self.variables, wanted)
             if extra is not None:
                 wanted = extra.name
                 if wanted not in self.names:
