@@ -868,7 +868,10 @@ def test_the_worst_rows_are_the_least_where_a_limit_is_a_least_and_the_first_of_
     assert unlimited._worst(0) == []
 
 
-@pytest.mark.parametrize(("least", "most", "said"), [(3.0, None, "margin 1 %: 1 dB"), (None, 3.0, "margin 99 %: 9 dB")])
+@pytest.mark.parametrize(
+    ("least", "most", "said"),
+    [(3.0, None, "margin 1 %: 1 dB"), (None, 3.0, "margin 99 %: 9 dB"), (0.0, None, "margin 1 %: 1 dB")],
+)
 def test_the_quantile_shown_is_renewed_with_a_tenth_more_rows_or_at_the_end(least, most, said):
     made = a_runner(least, most)
     made.pace.here = made.pace.done = 4

@@ -1247,3 +1247,21 @@ def test_copies_that_only_others_make_alike_and_chains_that_nothing_reads_go_too
     for power in range(4):
         wanted = (C @ np.linalg.matrix_power(A, power) @ B).item()
         assert (made.C @ np.linalg.matrix_power(made.A, power) @ made.B).item() == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(("outputs", "inputs"), [(1, 2), (2, 1), (1, 1)])
+def test_forms_of_a_model_stand_in_cells_but_those_of_one_input_and_output(tmp_path, outputs, inputs):
+    """Each entry adds its input k times what is held of it, k other for each."""
+    k = 1.0 + np.arange(outputs * inputs).reshape(outputs, inputs)
+    A, B = -np.diag(np.arange(1.0, 1.0 + inputs)), np.eye(inputs)
+    made = model(A, B, k)
+    matrices.write_mat([made], tmp_path / "a.mat")
+    record = loadmat(tmp_path / "a.mat")["made"][0, 0]
+    for key in ("z", "p", "num", "den"):
+        assert (record[key].dtype == object) is (outputs * inputs > 1), key
+    if outputs * inputs > 1:
+        assert record["p"].shape == record["num"].shape == k.shape
+        for o, i in np.ndindex(k.shape):
+            assert record["p"][o, i].tolist() == [[-1.0 - i]] and record["num"][o, i][0, -1] == k[o, i]
+    else:
+        assert record["p"].tolist() == [[-1.0]] and record["num"][0, -1] == k.item()

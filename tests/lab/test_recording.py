@@ -598,6 +598,7 @@ def test_the_error_of_a_recording_is_one_line_with_its_evidence():
     error = RecordingError("a\nb.csv: y leads", [finding])
     assert (str(error), error.findings, error.page) == ("a\\u000ab.csv: y leads", (finding,), "recordings")
     assert RecordingError("x").findings == ()
+    assert str(RecordingError("5\u00a0\u202fkHz\u2028")) == "5\u00a0\u202fkHz\\u2028"
 
 
 LAYOUT = Layout(",", 4, (("t", "u", "", "y (um)"), ("s", "V", "V", "")), 3, "utf-8")

@@ -1,5 +1,6 @@
 """Recordings from binary and LabVIEW files: what is read, and each refusal of a damaged or contradictory file."""
 
+import hashlib
 import io
 import itertools
 import logging
@@ -2565,3 +2566,12 @@ def test_channels_that_start_apart_from_each_other_are_refused_in_any_order(tmp_
             file.write_segment([ChannelObject("g", name, DRIVE, {**known, "wf_start_offset": offset})])
     last, first = (f"g/{'abc'[choose(range(3), key=offsets_s.__getitem__)]}" for choose in (max, min))
     assert f"'{last}' starts 0.0008 s apart from '{first}'" in refusal(path, "a", ("b", "c"))
+
+
+@pytest.mark.parametrize(("quoted", "regular"), [((), True), ((0,), False), ((1,), False), ((2,), False)])
+def test_a_text_is_regular_where_all_of_its_blocks_are(tmp_path, monkeypatch, quoted, regular):
+    path = tmp_path / "a.csv"
+    path.write_text("".join(f'{k},"{-k}"\n' if k in quoted else f"{k},{-k}\n" for k in range(3)))
+    monkeypatch.setattr(text_format, "_blocks", lambda of: of.read_bytes().splitlines(keepends=True))
+    layout = text_format.Layout(",", 2, (), 1, "utf-8")
+    assert text_format._scan(path, layout) == (hashlib.sha256(path.read_bytes()).hexdigest(), regular)

@@ -437,7 +437,8 @@ def test_a_port_in_use_is_refused(refused):
     )
 
 
-def test_a_file_that_is_not_there_is_refused(refused):
+def test_a_file_that_is_not_there_is_refused(refused, monkeypatch):
+    monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("it would wait without end"))
     assert "missing.toml" in refused("studio", "missing.toml", "--no-browser")
 
 
