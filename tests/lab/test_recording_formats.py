@@ -2575,3 +2575,14 @@ def test_a_text_is_regular_where_all_of_its_blocks_are(tmp_path, monkeypatch, qu
     monkeypatch.setattr(text_format, "_blocks", lambda of: of.read_bytes().splitlines(keepends=True))
     layout = text_format.Layout(",", 2, (), 1, "utf-8")
     assert text_format._scan(path, layout) == (hashlib.sha256(path.read_bytes()).hexdigest(), regular)
+
+
+@pytest.mark.parametrize(
+    ("written", "becomes"), [(rb"(Date\t)[^\t\r]*", rb"\g<1>01.01.2026"), (rb"(Time\t12:00:0\d)\.[^\t\r]*", rb"\1")]
+)
+def test_lvm_segments_with_a_clock_of_another_form_have_no_start(tmp_path, written, becomes):
+    path = lvm(tmp_path / "a.lvm", segments=2)
+    path.write_bytes(re.sub(written, becomes, path.read_bytes()))
+    source = LvmSource(path)
+    assert source.names == ("0/drive", "0/output", "1/drive", "1/output")
+    assert source._start_s(source._segments[0]) is None

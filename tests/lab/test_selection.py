@@ -1408,3 +1408,21 @@ def test_models_side_by_side_begin_in_two_rounds_and_are_heard_of_in_their_own_o
     known = fits[-1] if with_eq_3 else None  # made in the first round, where it is asked for
     assert [at for _, at in begun] == [None] * len(first) + [known] * 2
     assert starts == ([] if with_eq_3 else [len(first)])
+
+
+@pytest.mark.parametrize(("model", "admissible"), [("bouc_wen_classical", True), ("bouc_wen_admissible", False)])
+def test_joint_forms_are_bounded_where_that_is_asked_for_and_not_by_what_other_models_are_called(
+    monkeypatch, model, admissible
+):
+    class AskedError(Exception):
+        pass
+
+    def made(**given):
+        raise AskedError(given["admissible"])
+
+    monkeypatch.setattr(choice, "Candidates", made)
+    drive = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(400) / 200.0)
+    recording = recording_from_arrays(np.round(drive, 4), np.round(10.0 * drive, 4), rate_hz=200.0)
+    with pytest.raises(AskedError) as told:
+        choice.identify([recording], models=(model,), admissible=admissible, output_unit="urad")
+    assert told.value.args == (admissible,)

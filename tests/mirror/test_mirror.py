@@ -1309,12 +1309,13 @@ def test_small_numbers_of_a_summary_are_not_rounded_to_none(table):
     assert [mirror_summary._mrad_v(x) for x in (-3e-7, 1e-5, 0.5)] == ["-0.0003", "0.010", "500.000"]
 
 
-def test_a_rate_below_one_volt_a_second_is_told_in_digits():
+@pytest.mark.parametrize(("rate_v_s", "shown"), [(0.25, "0.25"), (10.0, "10"), (886.75, "886")])
+def test_a_rate_below_ten_volts_a_second_is_told_in_digits_and_others_are_never_rounded_up(rate_v_s, shown):
     model = mirror_summary.BoucWen(1e-6, 1e-7, 1.0, 0.0, 0.0, 0.0)
-    limited = SimpleNamespace(reversal_slope_rad_v=lambda: 1.0, admissible_rate_v_s=0.25, rate_limit_v_s=10.0)
+    limited = SimpleNamespace(reversal_slope_rad_v=lambda: 1.0, admissible_rate_v_s=rate_v_s, rate_limit_v_s=900.0)
     assert not isinstance(model, mirror_summary.PrandtlIshlinskii)
     assert mirror_summary._admissibility(limited) == (
-        "the slope after a reversal stays positive only up to 0.25 V/s before the reversal",
+        f"the slope after a reversal stays positive only up to {shown} V/s before the reversal",
     )
 
 

@@ -2087,3 +2087,13 @@ def test_the_sequence_names_both_divergences_the_point_ahead_where_there_is_one_
         communication=ns(data_rate_bit_s=2.5e9),
     )
     assert drawings._sequence(mission) == ["wide beacon, 750 µrad", "answer, 40 µrad", said, "lock; 2.5 Gbit/s"]
+
+
+@pytest.mark.parametrize(("least_v", "most_v", "beyond"), [(0.0, 12.0, 0), (1.0, 12.0, 1), (0.0, 11.0, 1)])
+def test_loops_that_lie_beyond_one_end_of_the_identified_range_are_told(least_v, most_v, beyond):
+    m = ns(
+        mirror=ns(bias_v=6.0, drive_min_v=least_v, drive_max_v=most_v),
+        scenario=ns(loop_amplitude_v=6.0),
+        amplifier=ns(output_min_v=0.0, gain=15.0, output_max_v=180.0),
+    )
+    assert len(words._of_loops(ns(file=ns(mission=m), loops=[]))) == beyond

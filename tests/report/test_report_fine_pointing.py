@@ -500,6 +500,10 @@ def test_a_missed_requirement_is_said_everywhere(plain, fine, mission):
     assert report.summary(with_fine(plain, missed))["fine_pointing"]["met"] is False
     other = with_residual(fine, THIRD, quantile_rad=11.7e-6)
     assert f"The requirement is missed by {THIRD}." in words.result(other, REQUIRED_RAD)
+    baseline = fine.verified[0].design.name
+    assert f"The requirement is missed by {baseline}." in words.result(
+        with_residual(fine, baseline, quantile_rad=11.7e-6), REQUIRED_RAD
+    )
     on_comparison = with_residual(fine, SECOND, "comparison", quantile_rad=11.7e-6)
     assert "11.7 µrad on the comparison model (missed)" in " ".join(words.result(on_comparison, REQUIRED_RAD))
 

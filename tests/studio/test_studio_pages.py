@@ -3186,3 +3186,22 @@ def test_a_command_of_a_mission_that_is_not_saved_is_copied_with_a_warning(sessi
     words = "The command reads the file: save the mission first, for the same numbers."
     of = (commands.design if page is control.ControlPage else commands.budget)(Path("leo-geo.toml"))
     assert (copied, notes) == ([of, of], [(words, "warning")])
+
+
+@pytest.mark.usefixtures("tab")
+def test_a_slider_that_was_moved_goes_back_with_the_text_that_it_had(session, monkeypatch):
+    key = "terminals.leo_aperture"
+    found = {slider.key: slider for group in link_view.sliders(session.draft).values() for slider in group}[key]
+    shown = []
+
+    async def nothing(key, text):
+        pass
+
+    row = sliders.SliderRow(found, nothing, nothing)
+    monkeypatch.setattr(row, "run_method", lambda name, new: shown.append((name, new)))
+    heard = {each.type: each.handler for each in row._event_listeners.values()}
+    asyncio.run(heard["try_place"](SimpleNamespace(args=found.position + 5)))
+    asyncio.run(heard["set_text"](SimpleNamespace(args=found.typed)))
+    assert [name for name, _ in shown] == ["show", "show"]
+    assert shown[0][1] == {"text": found.at(found.position + 5)}
+    assert shown[1][1]["place"] == found.position and row.typed == found.typed
