@@ -518,9 +518,15 @@ def test_a_larger_margin_and_drives_of_hysteresis_are_data_of_a_design_of_severa
         margins = SimpleNamespace(modulus=0.5, disk=SimpleNamespace(disk=0.4, freq_hz=80.0), bandwidth_hz=120.0)
         one = made(margin=margin, forward=forward)
         design = SimpleNamespace(
-            name="PI", tuned={}, margin=margin, margins=margins, controller=one.controller, drive_v=np.ones(2)
+            name="PI",
+            tuned=(("gain", 3.0), ("corner_hz", 40.0)),
+            margin=margin,
+            margins=margins,
+            controller=one.controller,
+            drive_v=np.ones(2),
         )
         data = coupled_design._data(design, left, "mark")
+        assert data["tuned"] == {"gain": 3.0, "corner_hz": 40.0}
         assert (data["residual_rms_rad"], data["simulated_rms_rad"]) == ([1e-6, 3e-6], [2e-6, 4e-6])
         assert data.get("tuned_for_modulus_margin") == margin
         assert data["matrices"].get("drives_of_hysteresis") == (None if forward is None else [[5.0, 5.0]])

@@ -558,3 +558,9 @@ def test_a_file_that_is_not_read_says_why_in_full_and_what_to_save(tmp_path, mon
         f"{where}it holds more than 3 arrays",
         "save the arrays that are needed alone",
     )
+
+
+def test_a_bound_on_what_is_unpacked_is_none_on_the_file(tmp_path):
+    """Two arrays of 800 bytes that are not compressed, read with a bound of 1000."""
+    savemat(tmp_path / "a.mat", {"first": np.arange(100.0), "last": np.arange(100.0)})
+    assert [*MatlabFile(tmp_path / "a.mat", 1000).variables] == ["first", "last"]

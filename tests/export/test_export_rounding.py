@@ -848,3 +848,10 @@ def test_each_of_three_actuators_learns_from_its_own_target_and_error_behind_its
             found = made._inverse(np.repeat(outputs[:, None], runs, axis=1))
             np.testing.assert_allclose(found, np.repeat(added[:, None], runs, axis=1), rtol=1e-12)
         lag = LEARNING.lag_keep * lag + (1.0 - LEARNING.lag_keep) * added[[2, 0]]
+
+
+def test_what_adds_up_goes_on_from_what_it_may_be_at_most():
+    """Errors of 8 that may be 2 at most leave half of 2 behind, not half of 8."""
+    keep, added = np.array([0.5, 0.5, 0.5, 1.0]), np.array([1.0, 8.0, 0.0, 0.25])
+    found = rounding._accumulated(keep, added, np.array([4.0, 2.0, 9.0, 9.0]))
+    assert found.tolist() == [1.0, 2.0, 1.0, 1.25]

@@ -246,3 +246,13 @@ def test_the_fitted_angle_says_of_which_light_and_air_it_is_between_which_freque
     assert asked == [(((0.2, 7.0, 2e3), (3e-12, 2e-12, 1e-15)), said)]
     other = disturbance.angle_of_arrival(replace(given, basis="another light", source="another page"))
     assert (other.source, other.basis) == ("another page", "another light; from 200 mHz to 2 kHz; as fitted")
+
+
+def test_its_spectrum_ends_at_half_the_rate_of_the_plant_s_steps_where_the_air_is_faster(tmp_path):
+    file = station_file(tmp_path, ('line_of_sight_rate = "255 urad/s"', 'line_of_sight_rate = "50 mrad/s"'))
+    ends = []
+    for step_s in (1e-2, 2e-2, 1e-9):
+        fine = file.mission.fine_pointing.model_copy(update={"plant_step_s": step_s})
+        mission = file.mission.model_copy(update={"fine_pointing": fine})
+        ends.append(link.arrival_of(replace(file, mission=mission)).freq_hz[-1])
+    assert ends[:2] == pytest.approx([50.0, 25.0], rel=1e-12) and 50.0 < ends[2] < 1e7

@@ -543,6 +543,9 @@ def test_a_mirror_in_two_places_of_the_text_and_one_that_is_missing(tmp_path):
     )
     for text, lead in (("", "\n"), ("[amplifier]\n", "[amplifier]\n\n"), ("[mirrors]", "[mirrors]\n\n")):
         assert with_mirror_file(draft.with_text(text), tmp_path / "s.toml").text == f'{lead}[mirror]\nfile = "s.toml"\n'
+    for lead in ("", " ", "\t"):
+        indented = draft.with_text(f'a = 1\n{lead}[mirror]\n{lead}name = "a"\n[other]')
+        assert with_mirror_file(indented, tmp_path / "s.toml").text == 'a = 1\n[mirror]\nfile = "s.toml"\n[other]'
     windows = with_mirror_file(replace(draft, text="a = 1\r\nb = 1"), tmp_path / "s.toml").text
     assert windows == 'a = 1\r\nb = 1\r\n\r\n[mirror]\r\nfile = "s.toml"\r\n'
     inline = draft.with_text('[mirror]\nnot toml\nname = "a"\n\n[mirror.linear]\n# gone\nx = 1\nnot toml\n[other]')

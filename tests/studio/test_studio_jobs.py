@@ -1403,3 +1403,16 @@ def test_a_job_that_cannot_be_started_yet_waits_in_the_queue(studio, tmp_path, m
     assert [(job.number, job.title, job.state) for job in found] == [(1, "one", "queued"), (2, "two", "queued")]
     shutil.rmtree(studio.folder / "1")
     shutil.rmtree(studio.folder / "2")
+
+
+def test_a_job_prints_as_the_pages_read_it_whatever_the_user_has_set(monkeypatch):
+    monkeypatch.setenv("PYTHONIOENCODING", "latin-1")
+    monkeypatch.setenv("PYTHONUNBUFFERED", "")
+    monkeypatch.setenv("OTHER", "of the user")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["src", "", "/there"]))
+    found = jobs_process._environment()
+    assert (found["PYTHONIOENCODING"], found["PYTHONUNBUFFERED"]) == ("utf-8:replace", "1")
+    assert (found["OTHER"], found["PYTHONPATH"]) == (
+        "of the user",
+        os.pathsep.join([str(Path("src").absolute()), str(Path("/there").absolute())]),
+    )
