@@ -1,5 +1,6 @@
 """A call is made again with arguments in which something is another thing, and with no arguments that do harm."""
 
+import math
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
@@ -165,6 +166,22 @@ def test_a_call_that_would_tell_its_test_something_again_is_not_made_again():
     assert call_of(lambda on_progress: on_progress(1.0), lambda x: told.append(x)) is None  # noqa: PLW0108
     assert told == [1.0, 1.0]
     assert call_of(lambda scale: scale(1.0), lambda x: 2.0 * x) is not None
+
+
+def test_nor_is_one_that_tells_it_through_a_function_of_the_package():
+    told = []
+
+    def around(function):
+        def judge(x):
+            return judge and function(x)
+
+        judge.__module__ = "microrad.lab"
+        return judge
+
+    assert call_of(lambda judge: judge(4.0), around(told.append)) is None
+    assert call_of(lambda judge: judge(4.0), around(around(told.append))) is None
+    assert told == [4.0, 4.0]
+    assert call_of(lambda judge: judge(4.0), around(math.sqrt)) is not None
 
 
 def test_what_takes_long_is_stopped_and_refused_arguments_have_no_value():

@@ -223,10 +223,19 @@ def _looked_through(of: object) -> int:
 
 
 def _tells(of: object) -> bool:
-    """Whether it may be a function by which a test is told something, and would be told it again."""
-    if isinstance(of, types.BuiltinFunctionType):
-        return not isinstance(of.__self__, types.ModuleType | None)
-    return isinstance(of, types.FunctionType) and bool(of.__closure__) and not of.__module__.startswith("microrad")
+    """Whether it may be a function by which a test is told something, and would be told it again, or one around it."""
+    waiting, known = [of], set[int]()
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, types.BuiltinFunctionType) and not isinstance(each.__self__, types.ModuleType | None):
+            return True
+        if not isinstance(each, types.FunctionType) or not each.__closure__ or id(each) in known:
+            continue
+        if not each.__module__.startswith("microrad"):
+            return True
+        known.add(id(each))
+        waiting.extend(cell.cell_contents for cell in each.__closure__ if cell != types.CellType())
+    return False
 
 
 def _held(of: Any) -> list[Any]:

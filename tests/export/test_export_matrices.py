@@ -1251,7 +1251,7 @@ def test_copies_that_only_others_make_alike_and_chains_that_nothing_reads_go_too
 
 @pytest.mark.parametrize(("outputs", "inputs"), [(1, 2), (2, 1), (1, 1)])
 def test_forms_of_a_model_stand_in_cells_but_those_of_one_input_and_output(tmp_path, outputs, inputs):
-    """Each entry adds its input k times what is held of it, k other for each."""
+    """Entry (o, i) is k[o, i] / (s + 1 + i), no two k alike."""
     k = 1.0 + np.arange(outputs * inputs).reshape(outputs, inputs)
     A, B = -np.diag(np.arange(1.0, 1.0 + inputs)), np.eye(inputs)
     made = model(A, B, k)

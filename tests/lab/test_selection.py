@@ -1273,12 +1273,16 @@ def test_what_is_judged_over_hours_is_told_in_plain_seconds():
     assert found.text == "1230 s of 2 recordings, slow.csv (1230 s) and fast.csv (0.5 s)"
 
 
+def straight():
+    """A recording of two periods of a mirror without hysteresis."""
+    drive = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(400) / 200.0)
+    return recording_from_arrays(np.round(drive, 4), np.round(10.0 * drive, 4), rate_hz=200.0)
+
+
 def test_a_mirror_without_hysteresis_is_identified_in_the_end():
     """What is left is rounding: a search that follows it to ever stiffer operators never came back."""
-    drive = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(400) / 200.0)
-    recording = recording_from_arrays(np.round(drive, 4), np.round(10.0 * drive, 4), rate_hz=200.0)
     with no_hang():
-        found = choice.identify([recording], models=STATIC_FORMS, output_unit="urad")
+        found = choice.identify([straight()], models=STATIC_FORMS, output_unit="urad")
     assert len(found.scores) + len(found.refused) == len(STATIC_FORMS)
 
 
@@ -1421,8 +1425,6 @@ def test_joint_forms_are_bounded_where_that_is_asked_for_and_not_by_what_other_m
         raise AskedError(given["admissible"])
 
     monkeypatch.setattr(choice, "Candidates", made)
-    drive = 50.0 - 50.0 * np.cos(2.0 * np.pi * np.arange(400) / 200.0)
-    recording = recording_from_arrays(np.round(drive, 4), np.round(10.0 * drive, 4), rate_hz=200.0)
     with pytest.raises(AskedError) as told:
-        choice.identify([recording], models=(model,), admissible=admissible, output_unit="urad")
+        choice.identify([straight()], models=(model,), admissible=admissible, output_unit="urad")
     assert told.value.args == (admissible,)

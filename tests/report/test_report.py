@@ -1584,18 +1584,22 @@ def test_hysteresis_costs_the_named_controllers_of_both_loops_and_no_others():
 
 
 @pytest.mark.parametrize(
-    ("amplitude", "least", "most", "beyond"),
+    ("amplitude", "identified", "least", "most", "beyond"),
     [
-        (6.0, 0.0, 180.0, ()),
-        (6.5, -50.0, 500.0, ("the range that the mirror was identified for",)),
-        (6.0, 0.0, 179.0, ("the amplifier's range",)),
-        (6.0, 1.0, 180.0, ("the amplifier's range",)),
-        (7.0, 0.0, 180.0, ("the range that the mirror was identified for", "the amplifier's range")),
+        (6.0, (0.0, 12.0), 0.0, 180.0, ()),
+        (6.5, (0.0, 12.0), -50.0, 500.0, ("the range that the mirror was identified for",)),
+        (6.0, (0.0, 12.0), 0.0, 179.0, ("the amplifier's range",)),
+        (6.0, (0.0, 12.0), 1.0, 180.0, ("the amplifier's range",)),
+        (7.0, (0.0, 12.0), 0.0, 180.0, ("the range that the mirror was identified for", "the amplifier's range")),
+        (6.0, (1.0, 12.0), 0.0, 180.0, ("the range that the mirror was identified for",)),
+        (6.0, (0.0, 11.0), 0.0, 180.0, ("the range that the mirror was identified for",)),
     ],
 )
-def test_loops_are_drawn_beyond_what_is_known_of_the_mirror_or_what_its_amplifier_can(amplitude, least, most, beyond):
+def test_loops_are_drawn_beyond_what_is_known_of_the_mirror_or_what_its_amplifier_can(
+    amplitude, identified, least, most, beyond
+):
     m = ns(
-        mirror=ns(bias_v=6.0, drive_min_v=0.0, drive_max_v=12.0),
+        mirror=ns(bias_v=6.0, drive_min_v=identified[0], drive_max_v=identified[1]),
         scenario=ns(loop_amplitude_v=amplitude),
         amplifier=ns(output_min_v=least, gain=15.0, output_max_v=most),
     )
@@ -2087,13 +2091,3 @@ def test_the_sequence_names_both_divergences_the_point_ahead_where_there_is_one_
         communication=ns(data_rate_bit_s=2.5e9),
     )
     assert drawings._sequence(mission) == ["wide beacon, 750 µrad", "answer, 40 µrad", said, "lock; 2.5 Gbit/s"]
-
-
-@pytest.mark.parametrize(("least_v", "most_v", "beyond"), [(0.0, 12.0, 0), (1.0, 12.0, 1), (0.0, 11.0, 1)])
-def test_loops_that_lie_beyond_one_end_of_the_identified_range_are_told(least_v, most_v, beyond):
-    m = ns(
-        mirror=ns(bias_v=6.0, drive_min_v=least_v, drive_max_v=most_v),
-        scenario=ns(loop_amplitude_v=6.0),
-        amplifier=ns(output_min_v=0.0, gain=15.0, output_max_v=180.0),
-    )
-    assert len(words._of_loops(ns(file=ns(mission=m), loops=[]))) == beyond

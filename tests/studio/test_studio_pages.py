@@ -2393,12 +2393,20 @@ SLIDERS = {
 }
 
 
+def slider_of(session, key):
+    return next(each for group in link_view.sliders(session.draft).values() for each in group if each.key == key)
+
+
+def heard_by(row):
+    """What a row does at each event."""
+    return {each.type: each.handler for each in row._event_listeners.values()}
+
+
 @pytest.mark.parametrize("key", SLIDERS)
 def test_a_slider_tells_what_is_tried_and_what_is_let_go(session, tab, key):
     typed, event, given, told = SLIDERS[key]
     session.set(key, typed)
-    found = {slider.key: slider for group in link_view.sliders(session.draft).values() for slider in group}
-    said = []
+    slider, said = slider_of(session, key), []
 
     async def tried(key, text):
         said.append(("try", key, text))
@@ -2406,10 +2414,10 @@ def test_a_slider_tells_what_is_tried_and_what_is_let_go(session, tab, key):
     async def let_go(key, text):
         said.append(("set", key, text))
 
-    row = sliders.SliderRow(found[key], tried, let_go)
-    begin = {"fault": "", "text": typed, "place": found[key].position, "steps": 240}
-    assert (row.props["label"], row.props["begin"]) == (found[key].label, begin)
-    heard = {each.type: each.handler for each in row._event_listeners.values()}
+    row = sliders.SliderRow(slider, tried, let_go)
+    begin = {"fault": "", "text": typed, "place": slider.position, "steps": 240}
+    assert (row.props["label"], row.props["begin"]) == (slider.label, begin)
+    heard = heard_by(row)
     assert [*heard] == ["try_text", "set_text", "try_place", "set_place"]
     asyncio.run(heard[event](SimpleNamespace(args=given)))
     assert said == [(told[0], key, told[1])]
@@ -3191,18 +3199,15 @@ def test_a_command_of_a_mission_that_is_not_saved_is_copied_with_a_warning(sessi
 
 @pytest.mark.usefixtures("tab")
 def test_a_slider_that_was_moved_goes_back_with_the_text_that_it_had(session, monkeypatch):
-    key = "terminals.leo_aperture"
-    found = {slider.key: slider for group in link_view.sliders(session.draft).values() for slider in group}[key]
-    shown = []
+    found, shown = slider_of(session, "terminals.leo_aperture"), []
 
     async def nothing(key, text):
         pass
 
     row = sliders.SliderRow(found, nothing, nothing)
     monkeypatch.setattr(row, "run_method", lambda name, new: shown.append((name, new)))
-    heard = {each.type: each.handler for each in row._event_listeners.values()}
-    asyncio.run(heard["try_place"](SimpleNamespace(args=found.position + 5)))
-    asyncio.run(heard["set_text"](SimpleNamespace(args=found.typed)))
+    asyncio.run(heard_by(row)["try_place"](SimpleNamespace(args=found.position + 5)))
+    asyncio.run(heard_by(row)["set_text"](SimpleNamespace(args=found.typed)))
     assert [name for name, _ in shown] == ["show", "show"]
     assert shown[0][1] == {"text": found.at(found.position + 5)}
     assert shown[1][1]["place"] == found.position and row.typed == found.typed
