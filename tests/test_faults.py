@@ -110,3 +110,36 @@ def test_tests_that_fail_without_a_fault_are_told_and_left_out(faults, tiny, tmp
     (faults.ROOT / "tests" / "test_sharp.py").write_text(A_TEST.format(3, "== 7"), encoding="utf-8")
     assert list(faults.callers([tiny], tmp_path)["sum"]) == ["tests/test_blunt.py::test_2"]
     assert "left out, as they fail without a mistake: tests/test_sharp.py::test_3\n" in capsys.readouterr().out
+
+
+def test_a_seed_draws_lines_of_functions_in_the_order_of_the_package(faults):
+    drawn = faults.drawn(7)
+    assert (len(drawn), len(set(drawn)), faults.drawn(7)) == (faults.DRAWN, faults.DRAWN, drawn)
+    assert faults.drawn(8) != drawn
+    assert [line.partition(":")[0] for line in drawn] == sorted(line.partition(":")[0] for line in drawn)
+    for place, text in (line.split(": ", maxsplit=1) for line in drawn):
+        function, number = place.split(", ")
+        fault = faults.Fault("x", "link", "sign", function, text, "", "")
+        source = fault.file(ROOT).read_text(encoding="utf-8")
+        assert source.splitlines()[int(number) - 1].strip() == text
+        node = fault.node(source)
+        assert node.body[0].lineno <= int(number) <= node.end_lineno
+
+
+def test_lines_of_code_are_those_of_bodies(faults, tmp_path, monkeypatch):
+    monkeypatch.setattr(faults, "ROOT", tmp_path)
+    file = tmp_path / "src" / "microrad" / "link" / "__init__.py"
+    file.parent.mkdir(parents=True)
+    file.write_text(
+        'A = 1\n\n\ndef f(a,\n      b):\n    """What it is.\n\n    More."""\n\n    # why\n    return a  # here\n\n\n'
+        "class C:\n    x = 2\n\n    @property\n    def g(self):\n        def h():\n            return 3\n\n"
+        "        return (h(),\n                4)\n",
+        encoding="utf-8",
+    )
+    assert faults.code_of(file) == [
+        "microrad.link:f, 11: return a  # here",
+        "microrad.link:C.g, 19: def h():",
+        "microrad.link:C.g, 20: return 3",
+        "microrad.link:C.g, 22: return (h(),",
+        "microrad.link:C.g, 23: 4)",
+    ]
