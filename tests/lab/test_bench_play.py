@@ -655,3 +655,43 @@ def test_what_a_check_finds_in_a_folder_can_be_taken_on(tmp_path):
     found = bench_folder.read_folder(tmp_path, ("clipping",))
     assert [(Path(each.path).name, use) for each, use in found] == [("a.npz", "identification"), ("b.npz", "x")]
     assert [[f.kind for f in each.findings if f.refused] for each, _ in found] == [[], ["clipping"]]
+
+
+def test_binary_files_of_two_axes_say_of_what_record_and_in_what_units_they_are(two_axes, two_axes_folder):
+    for played in play(two_axes, 3)[1:]:
+        facts = {"rate_hz": played.rate_hz} | ({"period_samples": 500} if played.path == "m-2" else {})
+        names = ["drive1", "drive2", "angle1", "angle2"]
+        units = dict(zip(names, ["V", "V", "mrad", "mrad"], strict=True))
+        tdms = TdmsFile.read(two_axes_folder / f"{played.path}.tdms")
+        assert tdms.properties == {"name": played.path}
+        (group,) = tdms.groups()
+        assert (group.name, group.properties) == ("bench", facts)
+        clock = {"wf_start_offset": 0.0, "wf_increment": played.step_s, "wf_samples": played.samples}
+        for channel, (name, unit) in zip(group.channels(), units.items(), strict=True):
+            assert channel.name == name
+            assert channel.properties == {**clock, "wf_xname": "Time", "wf_xunit_string": "s", "unit_string": unit}
+        with h5py.File(two_axes_folder / f"{played.path}.h5") as file:
+            assert dict(file.attrs) == facts
+            assert {name: file[name].attrs["units"] for name in file} == units
+        with h5py.File(two_axes_folder / f"{played.path}-v73.mat") as file:
+            assert {name: item.shape for name, item in file.items()} == {
+                **dict.fromkeys(names, (1, played.samples)),
+                **dict.fromkeys(facts, (1, 1)),
+            }
+            assert {item.attrs["MATLAB_class"] for item in file.values()} == {b"double"}
+        head = (two_axes_folder / f"{played.path}-v73.mat").read_bytes()[:116]
+        assert head == b"MATLAB 7.3 MAT-file, Platform: microrad, HDF5 schema 1.00 .".ljust(116)
+        mat = scipy.io.whosmat(two_axes_folder / f"{played.path}.mat")
+        assert sorted(mat) == sorted(
+            [(name, (played.samples, 1), "double") for name in names]
+            + [(name, (1, 1), "double" if name == "rate_hz" else "int64") for name in facts]
+        )
+
+
+def test_a_manifest_is_a_text_in_the_letters_of_the_plan(two_axes, tmp_path):
+    plan = replace(two_axes, name="Möhre µ", formats=("npz",), records=two_axes.records[2:])
+    files = write_folder(plan, tmp_path / "made", 3)
+    text = (tmp_path / "made" / "manifest.json").read_text(encoding="utf-8")
+    assert files == (tmp_path / "made" / "c.npz",)
+    assert text.startswith('{\n  "plan": {\n    "name": "Möhre µ",\n    "file": "plan.toml",\n')
+    assert text.endswith("\n  }\n}\n")

@@ -1533,3 +1533,63 @@ def test_what_is_left_counts_those_held_out_and_not_the_kinds_that_have_one_reco
     else:
         assert channels_module._held_out(given, np.array(classes)).tolist() == held
         assert len(classes) - len(held) == left
+
+
+@pytest.mark.parametrize("size", [1e-2, 1.0, 500.0])
+def test_a_channel_is_driven_from_a_thousandth_of_the_power_of_the_strongest_on_however_small_that_is(size):
+    """The first drive alone, with 3 % of it on the second one, and with 4 %; and the second drive alone."""
+    one = drawn_at_random("r", 64, period=32)
+    drive = one.drive / one.drive.std(axis=0)
+    parts = ((1.0, 0.0), (0.0, 1.0), (1.0, 0.03), (1.0, 0.04))
+    given = [replace(one, drive=size * drive * part) for part in parts]
+    assert channels_module._held_out(given, np.zeros(4, dtype=int)).tolist() == [2]
+    assert channels_module._held_out([*given, given[3], given[1]], np.zeros(6, dtype=int)).tolist() == [2, 4, 5]
+
+
+def test_a_bias_of_drives_below_nothing_is_rounded_by_the_largest_of_all_records():
+    drives = ([[-1.234567891], [-8.0], [-2.0]], [[-1.234567891], [-3.0], [-80.0]])
+    records = [SimpleNamespace(drive=np.array(drive), period_samples=None) for drive in drives]
+    assert _rounded_bias(records).tolist() == [-1.2345679]
+    assert _rounded_bias(records[:1]).tolist() == [-1.23456789]
+
+
+def test_each_output_counts_by_its_own_size_in_the_loss_of_a_record():
+    output = np.array([[1.0, 10.0], [-1.0, -10.0], [1.0, -10.0], [-1.0, 10.0]])
+    error = np.array([[1.0, 0.0], [0.0, 10.0], [2.0, 10.0], [0.0, 0.0]])
+    record = Recording("r", "", output, output, 1.0, ("u", "v"), ("x", "y"))
+    np.testing.assert_allclose(held_out_module._loss(error, record), [0.5, 0.5, 2.5, 0.0])
+    np.testing.assert_allclose(held_out_module._loss(error, replace(record, period_samples=2)), [1.5, 0.25])
+
+
+@pytest.mark.parametrize("start", [None, SimpleNamespace(modes=None, delay_s=1e-3)])
+def test_hysteresis_does_not_begin_without_modes(start):
+    with pytest.raises(IdentificationError) as refused:
+        hysteretic.hysteretic_stiffness([], start, lambda *given: None)
+    assert str(refused.value) == "there is no coupled linear model of this order to begin with."
+
+
+def test_numbers_of_one_output_of_two_drives_are_counted(monkeypatch):
+    """Per axis poles, vectors and direct term of one drive; coupled a gain and a direct term of each."""
+    freq = np.arange(1.0, 81.0)
+    one = ModalModel(np.array([-20.0 + 200j]), np.array([[2.0 + 0j]]), np.array([[30.0 - 5j]]), np.zeros((1, 1)))
+    gain = np.zeros((80, 1, 2), dtype=complex)
+    gain[:, 0, 1] = one.response(freq, "first-order", 2000.0)[:, 0, 0]
+    fitted = linear.per_axis(table_of(gain, (1.0, 3.0)), 2, 0.0, None)
+    assert (fitted.order, fitted.parameters, fitted.mirror.B.shape, fitted.mirror.C.shape) == (2, 6, (2, 2), (1, 2))
+    model = ModalModel(np.array([-20.0 + 90j]), np.ones((1, 2)) + 0j, np.ones((1, 1)) + 0j, np.ones((1, 2)))
+    monkeypatch.setattr(linear, "without_delay", lambda response, delay_s, steps: response)
+    monkeypatch.setattr(linear, "fit_order", lambda response, order, exchanges: SimpleNamespace(model=model))
+    moved = linear_errors.Spread(np.ones((1, 11)), np.zeros(11))
+    monkeypatch.setattr(linear, "spread", lambda *given: moved)
+    found = linear.coupled_linear(table_of(gain, (1.0, 3.0)), 2, 1e-4, 5, None)
+    assert (found.name, found.order, found.parameters) == ("coupled linear, order 2", 2, 9)
+    assert {"matrices.B.2.2", "matrices.C.1.2", "matrices.D.1.2"} < set(found.known.parameters)
+    assert len(found.known.parameters) == 11
+
+
+def test_a_drive_makes_as_much_of_an_output_as_it_has_power_where_the_output_answers():
+    gain = np.array([[[9.0, 1.0], [1.0, 3.0]], [[0.0, 2.0], [4.0j, 0.0]]], dtype=complex)
+    power = np.array([np.diag([0.01, 1.0]), np.diag([8.0, 1.0])]) + 0j
+    table = replace(table_of(gain, (1.0, 1.0)), drive_power=power)
+    assert linear.strongest_drives(table) == [1, 0]
+    assert linear.strongest_drives(replace(table, drive_power=power[::-1])) == [0, 1]

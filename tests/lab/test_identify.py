@@ -1880,3 +1880,34 @@ def test_a_fit_of_eq_3_is_searched_from_its_starts_and_tightened_where_it_is_to_
     assert (problem is other) is admissible and rest == [units, "costs", admissible]
     fit_bouc_wen("recordings")
     assert asked[-1] == ((("recordings", Units()), math.inf), 12, 0) and len(told) == 1
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("epsilon", "bounded"), [(-0.5, True), (-0.015, False), (0.3, False)])
+def test_what_epsilon_may_take_back_of_d1_is_bounded_whichever_way_the_output_goes(sign, epsilon, bounded):
+    problem = problem_of(0.02)
+    columns, bound = problem.columns(THETA), problem.bound(THETA)
+    assert 0.015 < bound < 0.5
+    problem.target = columns @ (sign * 1e-4 * np.array([1.0, epsilon]))
+    d1, found = problem.linear(columns, THETA)
+    if bounded:
+        assert sign * d1 > 0.0 and found == pytest.approx(-bound * d1)
+    else:
+        assert (d1, found) == pytest.approx((sign * 1e-4, sign * 1e-4 * epsilon), rel=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("epsilon", "lowest", "admissible"),
+    [(0.2, -0.9e-3, True), (0.2, -1.1e-3, False), (0.2, 0.5e-3, True), (0.45, 0.5, False), (0.3665, 0.5, True)],
+)
+def test_a_fit_of_eq_3_is_admissible_to_a_thousandth_of_its_gain_along_its_records_and_behind_a_reversal(
+    monkeypatch, sign, epsilon, lowest, admissible
+):
+    """Behind a slow reversal the slope is 1 - 3 / 1.1 times epsilon, in d1: above 0 up to 0.3667."""
+    values = np.array([sign * 1e-4, 2e-4, -sign * epsilon * 1e-4, 3e-3, 1.5, sign * 0.4])
+    monkeypatch.setattr(bouc_wen_of, "lowest_slope", lambda problem, given: lowest * 1e-4)
+    fit = bouc_wen_of._report(problem_of(rate_limit=250.0), values, Units("V", "mrad"), np.ones(1), False)
+    assert fit.slope_after_reversal_rad_per_v == pytest.approx(1e-4 * (1.0 - epsilon * 3.0 / 1.1), abs=1e-12)
+    assert (fit.lowest_slope_rad_per_v, fit.admissible) == (lowest * 1e-4, admissible)
+    assert fit.falling is (sign < 0.0)

@@ -1490,3 +1490,146 @@ def test_a_gain_below_a_resonance_is_the_mean_up_to_a_tenth_of_it_or_that_of_the
     fit = SimpleNamespace(response=SimpleNamespace(freq_hz=np.array([10.0, 40.0, 90.0, 160.0]), response=gains))
     expected = np.mean([np.linalg.norm(each, 2) for each in gains[:lines]])
     assert amplitude._low_gain(fit, resonance_hz) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_main_resonance_counts_all_channels_and_is_that_of_the_smallest_amplitude_in_its_own_band():
+    """A drive along (3, 4) tells more than one along (4.5, 0), and so do outputs; a gain goes up to the same line."""
+    turn = 2 * np.pi
+    poles = [turn * (-60 + 100j), turn * (-60 + 300j), turn * (-60 + 700j)]
+
+    def fit(rms, poles, drives, outputs, band):
+        made = fit_of([rms], poles, [1.0, 2.0, 6.0, 99.0], [1.0, 2.0, 3.0][: len(poles)], band=band)
+        vectors = {"input_vectors": np.array(drives) + 0j, "output_vectors": np.array(outputs).T + 0j}
+        made.modes = replace(made.modes, **vectors, direct=np.zeros((2, 2)))
+        return made
+
+    ways = [(3.0, 4.0), (4.5, 0.0), (90.0, 90.0)]
+    one = [(1.0, 1.0)] * 3
+    for drives, outputs in ((ways, one), (one, ways), (one, [way[::-1] for way in ways])):
+        small = fit(1.0, poles, drives, outputs, (1.0, 500.0))
+        large = fit(2.0, [turn * (-30 + 90j)], drives[:1], outputs[:1], (200.0, 1000.0))
+        found = amplitude_dependence([large, small])
+        assert found.resonance_hz == pytest.approx([100.0, 90.0])
+        assert found.resonance_error_hz == pytest.approx(np.array([1.0, 1.0]) / turn)
+        assert found.damping_ratio == pytest.approx([60 / np.hypot(60, 100), 30 / np.hypot(30, 90)])
+        assert found.gain == pytest.approx([15.0, 15.0])  # lines of 2, 9 and 11 Hz, a tenth of 117 Hz
+
+
+def test_an_order_is_compared_with_the_next_smaller_and_the_next_larger_one_of_several():
+    of = [
+        fit_module.OrderScore(*row)
+        for row in (
+            (1, 2, 5000.0, 100, 5010.0, 0.0),
+            (2, 4, 900.0, 100, 920.0, 0.0),
+            (3, 6, 110.0, 100, 140.0, 0.0),
+            (4, 9, 107.25, 100, 145.0, 0.0),
+            (6, 13, 101.0, 100, 160.0, 0.0),
+        )
+    ]
+    chosen, reason = choose(of)
+    assert chosen == 3
+    assert reason.endswith(
+        "by order: 1: 50, 2: 9, 3: 1.1, 4: 1.07, 6: 1.01 (1 is what a true model leaves); order 2 is worse by 780; "
+        "order 4 gains 2.8 in chi-square for 3 parameters more, which is worth less than it costs"
+    )
+
+
+@pytest.mark.parametrize("elements", [(1, 2), (1, 1), (2, 1)])
+def test_one_output_of_two_drives_has_several_elements(monkeypatch, elements):
+    """No order but the one given is fitted there, and that one with exchanges."""
+    response = Answer(response=np.zeros((20, *elements)), freq_hz=np.arange(1.0, 21.0), hold="zero-order")
+    asked = []
+
+    def fit_one(given, order, *, direct, exchanges, fine=True, smaller=None):
+        asked.append((order, exchanges, fine, smaller))
+        return Answer(model=f"model {order}")
+
+    monkeypatch.setattr(fit_module, "response_from_periods", lambda given: response)
+    monkeypatch.setattr(fit_module, "fit_order", fit_one)
+    monkeypatch.setattr(fit_module, "_linear_fit", lambda *given: given)
+    found = fit_linear([Answer(period_samples=8)], 2, exchanges=5)
+    assert found[2].model == "model 2"
+    alone = [(1, 0, True, None), (2, 0, True, "model 1")]
+    assert asked == (alone if elements == (1, 1) else [(2, 5, True, None)])
+
+
+def two_of_each(imaginary=(40.0, 90.0)):
+    """Two real poles and two pairs of two drives and one output, every number its own."""
+    poles = np.array([-5.0, -70.0, -3.0 + 1j * imaginary[0], -8.0 + 1j * imaginary[1]])
+    b = np.array([[1.0, 2.0], [3.0, -1.0], [0.5 + 1j, 2.0], [1.0, -2j]])
+    return ModalModel(poles, b, np.array([[2.0, 1.0, 1.0 - 1j, 3.0 + 0.5j]]), np.array([[0.25, -0.75]]))
+
+
+@pytest.mark.parametrize("direct", [True, False])
+@pytest.mark.parametrize(("left", "taken"), [(1.9, True), (2.0, False)])
+def test_a_step_of_the_polish_keeps_poles_stable_and_pairs_above_the_axis(monkeypatch, direct, left, taken):
+    """With a normal matrix of squares of sizes the step is the gradient over these; a damping of 3 leaves a quarter."""
+    model = two_of_each()
+    size = 1.0 + np.arange(pack(model, direct).size)
+    ends = np.array([-2.0, 0.5, -1e3, -0.05, 0.0, -30.0])  # two real poles, two real parts, two frequencies
+    begins = np.array([-5.0, -70.0, -3.0, -8.0, 40.0, 90.0])
+    step = np.zeros(size.size)
+    step[:6], step[6:] = begins - ends, 0.01
+    asked = []
+
+    def fitted(equations, poles, inputs):
+        asked.append((poles, inputs))
+        return "fitted", left
+
+    monkeypatch.setattr(polish_of, "fit_outputs", fitted)
+    equations = SimpleNamespace(direct=direct, decay_rad_s=0.1)
+    found = polish_of._trial(equations, model, (np.diag(size**2), 4.0 * size**2 * step, 2.0), 3.0)
+    assert found == (("fitted", 1.9) if taken else None)
+    ((poles, inputs),) = asked
+    np.testing.assert_allclose(poles.real, [-2.0, -0.1, -1e3, -0.1], rtol=1e-12)
+    np.testing.assert_allclose(poles.imag, [0.0, 0.0, 1e-6, 30.0], rtol=1e-9)
+    np.testing.assert_allclose(inputs.real, model.input_vectors.real - 0.01, atol=1e-12)
+    np.testing.assert_allclose(inputs.imag[2:], model.input_vectors.imag[2:] - 0.01, atol=1e-12)
+    assert not inputs[:2].imag.any()
+
+
+def test_the_gain_that_a_step_promises_is_that_of_the_linear_problem_whatever_its_units():
+    draw = philox(8).standard_normal((9, 4)) * [1.0, 1e3, 1e-4, 5.0]
+    normal, gradient = draw.T @ draw, draw.T @ philox(9).standard_normal(9)
+    before = normal.copy()
+    found = polish_of._promised(normal, gradient)
+    assert found == pytest.approx(gradient @ np.linalg.solve(normal, gradient), rel=1e-8)
+    np.testing.assert_array_equal(normal, before)
+
+
+@pytest.mark.parametrize("best", [0, 17, 59])
+def test_a_model_of_one_drive_grows_by_the_real_pole_that_helps_most(monkeypatch, best):
+    model = ModalModel(
+        np.array([-9.0, -2.0 + 30j]), np.array([[2.0], [3.0 - 1j]]), np.array([[1.0, 2.0]]) + 0j, np.ones((1, 1))
+    )
+    asked = []
+
+    def fitted(equations, poles, inputs):
+        assert equations == "equations"
+        asked.append((poles, inputs))
+        return f"model {len(asked) - 1}", abs(len(asked) - 1 - best)
+
+    monkeypatch.setattr(order, "fit_outputs", fitted)
+    assert order._grown("equations", model, (2.0, 500.0)) == f"model {best}"
+    np.testing.assert_allclose([p[0] for p, _ in asked], -2 * np.pi * np.geomspace(0.2, 5000.0, 60), rtol=1e-12)
+    for poles, inputs in asked:
+        assert poles[1:].tolist() == model.poles_rad_s.tolist() and inputs.tolist() == [[1.0], [2.0], [3.0 - 1j]]
+
+
+@pytest.mark.parametrize("direct", [True, False])
+def test_an_order_begins_with_a_vector_fit_of_its_poles_weighed_by_the_mean_power_of_the_drives(monkeypatch, direct):
+    power = np.array([[[2.0, 0.5j], [-0.5j, 4.0]], [[1.0, 0.0], [0.0, 7.0]], [[8.0, 1.0], [1.0, 10.0]]])
+    asked = []
+
+    def fitted(freq, values, count, **words):
+        asked.append((freq, values, count, words))
+        return SimpleNamespace(modes=lambda: f"modes of {count}")
+
+    monkeypatch.setattr(order, "vector_fit", fitted)
+    monkeypatch.setattr(order, "reduced", lambda model, states: (model, states))
+    response = SimpleNamespace(hold="first-order", rate_hz=333.0)
+    assert order._start(response, ("freq", "values", power), (4, 7), direct) == ("modes of 7", 4)
+    ((freq, values, count, words),) = asked
+    assert (freq, values, count) == ("freq", "values", 7)
+    np.testing.assert_allclose(words.pop("weight"), np.sqrt([3.0, 4.0, 9.0]))
+    assert words == {"hold": "first-order", "rate_hz": 333.0, "strictly_proper": not direct, "iterations": 15}

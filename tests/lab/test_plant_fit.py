@@ -889,3 +889,211 @@ def test_what_a_search_leaves_is_told_of_each_run_in_the_units_of_its_recording(
     assert told == [([0.3, 4.0], True)] and cleared == [True]
     assert (fit.condition_number, fit.start_costs, fit.agreeing_starts) == (123.0, (3.0, 1.0, 1.0009, 1.0011), 2)
     assert (fit.evaluations, fit.converged) == (17, False)
+
+
+def problem_of(modelled, *, linear, lower, upper, beside=()):
+    """A problem whose outputs are a function of its point, asked for nothing beyond the bounds."""
+    asked = []
+    problem = object.__new__(PlantProblem)
+    problem.linear, problem.beside = np.array(linear), dict.fromkeys(beside)
+    problem.lower, problem.upper, problem.scale = np.array(lower), np.array(upper), np.ones(len(linear))
+    problem.structure = SimpleNamespace(late=lambda values: 1e-3 * float(values.sum()))
+    problem.used_beside = lambda number, delay_s: np.array([number, delay_s, 7.0])
+    problem.measured, problem.edges = np.array([1.0, 2.0, 4.0]), [2]
+
+    def at(point):
+        asked.append(point.copy())
+        return modelled(point)
+
+    problem.modelled = at
+    return problem, asked
+
+
+@pytest.mark.parametrize("central", [True, False])
+def test_a_slope_at_either_bound_is_that_of_the_side_within(central):
+    """The three numbers stand at the upper bound, at the lower one and in between; each acts with its square."""
+    point = np.array([2.0, -3.0, 0.5])
+    problem, asked = problem_of(
+        lambda p: np.array([p[0] ** 2, 10.0 * p[1] ** 2, 100.0 * p[2] ** 2 + p[0]]),
+        linear=[False] * 3,
+        lower=[0.0, -3.0, 0.0],
+        upper=[2.0, 5.0, 1.0],
+    )
+    step = plant_fit._DIFFERENCE
+    inner = 100.0 * (0.0 if central else step)
+    expected = [[4.0 - step, 0.0, 1.0], [0.0, 10.0 * (-6.0 + step), 0.0], [0.0, 0.0, 100.0 + inner]]
+    first, second = problem.rows(point, central=central)
+    found = np.vstack([first, second])
+    assert_allclose(found[:, 0], problem.modelled(point) - problem.measured)
+    assert_allclose(found[:, 1:], np.transpose(expected), atol=1e-8)
+    assert first.shape == (2, 4) and second.shape == (1, 4)
+    assert all((problem.lower <= p).all() and (p <= problem.upper).all() for p in asked)
+    some = np.vstack(problem.rows(point, central=central, free=[2, 0]))
+    assert_allclose(some[:, 1:], found[:, [3, 1]])
+
+
+def test_a_slope_near_a_bound_is_taken_as_far_as_that_to_one_side():
+    step = plant_fit._DIFFERENCE
+    problem, asked = problem_of(
+        lambda p: np.array([p[0] ** 2, p[1] ** 2, 0.0]),
+        linear=[False, False],
+        lower=[-9.0, -1.0],
+        upper=[1.0, 9.0],
+    )
+    found = np.vstack(problem.rows(np.array([1.0 - step / 4, -1.0 + step / 4]), central=True))
+    # of steps of 1/4 and 1: the slope of a square in the middle between both ends, 3/8 of a step away
+    assert_allclose(found[0, 1], 2.0 * (1.0 - step / 4 - 3 * step / 8), atol=1e-9)
+    assert_allclose(found[1, 2], -2.0 * (1.0 - step / 4 - 3 * step / 8), atol=1e-9)
+    assert max(p[0] for p in asked) <= 1.0 and min(p[1] for p in asked) >= -1.0
+
+
+def test_of_several_numbers_in_which_the_output_is_linear_each_is_simulated_without_the_others():
+    """One alone is simulated from where it is; what stands beside the rest is not, and known for the point's delay."""
+    point = np.array([2.0, 3.0, 4.0, 5.0])
+
+    def asked_of(linear, beside):
+        problem, asked = problem_of(
+            lambda p: np.array([p[0] ** 2 + 3.0 * p[1], 5.0 * p[2] + p[1], p[0] * p[1]]),
+            linear=linear,
+            lower=[-9.0] * 4,
+            upper=[9.0] * 4,
+            beside=beside,
+        )
+        found = np.vstack(problem.rows(point, central=True))
+        assert_allclose(found[:, 2:4], [[3.0, 0.0], [1.0, 5.0], [2.0, 0.0]], atol=1e-9)
+        assert_allclose(found[:, 4], [3.0, 14e-3, 7.0] if beside else [0.0] * 3, atol=1e-12)
+        return sorted(p.tolist() for p in asked if p[0] == 2.0 and p[1] in (0.0, 1.0, 3.0))
+
+    whole, nothing = point.tolist(), [2.0, 0.0, 0.0, 0.0]
+    each = [nothing, [2.0, 0.0, 1.0, 0.0], [2.0, 1.0, 0.0, 0.0], whole]
+    assert asked_of([False, True, True, True], [3]) == each
+    assert asked_of([False, True, True, True], []) == [nothing, [2.0, 0.0, 0.0, 1.0], *each[1:]]
+    assert asked_of([False, False, True, True], [3]) == [whole, whole, [2.0, 3.0, 5.0, 5.0]]
+
+
+def test_what_stands_at_either_bound_leaves_it_where_it_is_pulled_inward_and_gains_enough():
+    """Pulls are 2, -2, 2 and -2 at lower, lower, upper and upper bound, and 2 in between; each is worth 2."""
+    lower, upper = np.array([0.0, 0.0, -9.0, -9.0, 0.0, -1.0]), np.array([9.0, 9.0, 1.0, 1.0, 9.0, -0.5])
+    point = np.array([5e-8, 0.0, 1.0, 1.0 - 5e-8, 4.0, -0.5])
+    asked = []
+
+    def slopes(at, *, central, free):
+        asked.append((at is point, central, free))
+        return np.diag([1.0, -1.0, 1.0, -1.0, 1e-200])
+
+    problem = SimpleNamespace(lower=lower, upper=upper, slopes=slopes, residual=lambda at: np.full(5, -2.0))
+    found = plant_fit._would_leave(problem, point, 1.99)
+    assert found.tolist() == [True, False, False, True, False, False] and asked == [(True, False, [0, 1, 2, 3, 5])]
+    assert not plant_fit._would_leave(problem, point, 2.01).any()
+    free = SimpleNamespace(lower=np.full(2, -np.inf), upper=np.full(2, np.inf))
+    assert plant_fit._would_leave(free, np.zeros(2), 0.0).tolist() == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("start", "most", "rounds", "leaving", "points", "end", "evaluations"),
+    [
+        (  # all are at their bounds behind the first round, and then all are free
+            [-3.0, 0.0, 7.0],
+            100,
+            [
+                ([0.0, 0.0, 2.0], [1], 100, [1.0 - 3e-8], 8.0, 10),
+                ([0.0, 1.0, 2.0], [0, 1, 2], 90, [2e-8, 0.5, 1.0], 6.0, 7),
+                ([0.0, 0.5, 1.0], [0, 1, 2], 83, [0.5, 0.25, 1.5], 5.0, 3),
+            ],
+            [[False] * 3, [True, False, False], [False] * 3],
+            [[0.0, 1.0, 2.0], [0.0, 0.5, 1.0], [0.5, 0.25, 1.5]],
+            [0.5, 0.25, 1.5],
+            20,
+        ),
+        (  # as many as are allowed
+            [-3.0, 0.0, 7.0],
+            10,
+            [([0.0, 0.0, 2.0], [1], 10, [1.0 - 3e-8], 8.0, 10)],
+            [[False] * 3],
+            [[0.0, 1.0, 2.0]],
+            [0.0, 1.0, 2.0],
+            10,
+        ),
+        (  # what would not leave where it is not at its bound is told for nothing
+            [0.0, 0.0, 1.0],
+            50,
+            [
+                ([0.0, 0.0, 1.0], [1, 2], 50, [0.5, 1.5], 4.0, 1),
+                ([0.0, 0.5, 1.5], [0, 1, 2], 49, [0.1, -5.0 + 2e-8, 1.5], 3.0, 2),
+                ([0.1, -5.0, 1.5], [0, 2], 47, [0.2, 1.25], 2.0, 4),
+            ],
+            [[True, True, True], [True, False, True], [True, False, True]],
+            [[0.0, 0.5, 1.5], [0.1, -5.0, 1.5], [0.2, -5.0, 1.25]],
+            [0.2, -5.0, 1.25],
+            7,
+        ),
+    ],
+)
+def test_a_search_puts_what_is_at_a_bound_there_and_goes_on_with_what_would_leave(
+    monkeypatch, start, most, rounds, leaving, points, end, evaluations
+):
+    """Rounds of a search: where each begins, what is free in it, how many steps it may take, and where it ends."""
+    problem = SimpleNamespace(lower=np.array([0.0, -5.0, -np.inf]), upper=np.array([np.inf, 1.0, 2.0]))
+    asked, judged = [], []
+
+    def searched(of, point, free, tolerance, left, *, central):
+        assert of is problem and tolerance == 1e-3 and central is True
+        *_, x, cost, nfev = rounds[len(asked)]
+        asked.append((point.tolist(), free.tolist(), left))
+        return SimpleNamespace(x=np.array(x), cost=cost, nfev=nfev)
+
+    def would_leave(of, point, gain):
+        judged.append((point.tolist(), gain))
+        return np.array(leaving[len(judged) - 1])
+
+    monkeypatch.setattr(plant_fit, "_search_free", searched)
+    monkeypatch.setattr(plant_fit, "_would_leave", would_leave)
+    found = plant_fit._search(problem, np.array(start), 1e-3, most, central=True)
+    assert asked == [each[:3] for each in rounds]
+    assert [point for point, _ in judged] == points
+    assert [gain for _, gain in judged] == pytest.approx([1e-3 * each[4] for each in rounds])
+    assert (found.x.tolist(), found.nfev) == (end, evaluations)
+
+
+@pytest.mark.parametrize("samples", [25, 60, 61, 900])
+def test_the_power_about_a_line_is_a_mean_over_a_tenth_of_its_number_and_thirty_lines_at_least(samples):
+    """To either side, as far as there are any; each line counts by its worth, and by what the fit has left of it."""
+    draw = philox(samples)
+    residual = draw.standard_normal(samples) + 1j * draw.standard_normal(samples)
+    left, worth = draw.uniform(0.1, 1.0, samples), draw.uniform(0.2, 3.0, samples)
+    expected = []
+    for k in range(samples):
+        half = max(30, k // 10)
+        near = slice(max(k - half, 0), k + half + 1)
+        expected.append(np.sum(worth[near] * np.abs(residual[near]) ** 2) / np.sum(worth[near] * left[near]))
+    assert_allclose(plant_fit._mean_power(residual, left, worth), expected, rtol=1e-9)
+
+
+def test_what_a_fit_takes_out_of_a_run_counts_the_variances_of_all_runs(monkeypatch):
+    """Two runs of unlike noise: T = 2 G - G J'VJ G / v of each; numbers of sizes far apart."""
+    draw = philox(5)
+    sizes = np.array([1.0, 1e4, 1e-3])
+    jacobians = [draw.standard_normal((n, 3)) * sizes for n in (40, 30)]
+    left = [0.5 * draw.standard_normal(40), 3.0 * draw.standard_normal(30)]
+    rows = [np.column_stack([r, J]) for r, J in zip(left, jacobians, strict=True)]
+    problem = SimpleNamespace(
+        targets=[np.zeros((20, 2)), np.zeros((30, 1))], runs=[SimpleNamespace(nuisance=k) for k in ("one", "two")]
+    )
+    asked = []
+
+    def scatter(part, outputs, nuisance, taken):
+        asked.append((part, outputs, nuisance, taken))
+        return np.full((3, 3), float(outputs))
+
+    monkeypatch.setattr(plant_fit, "coloured_scatter", scatter)
+    assert_allclose(_scatter(problem, rows), np.full((3, 3), 3.0))
+    asked.sort(key=lambda each: each[2])
+    assert [(each[0] is part, *each[1:3]) for each, part in zip(asked, rows, strict=True)] == [
+        (True, 2, "one"),
+        (True, 1, "two"),
+    ]
+    G = np.linalg.inv(sum((J / sizes).T @ (J / sizes) for J in jacobians))
+    variances = [np.mean(r**2) for r in left]
+    middle = sum(v * (J / sizes).T @ (J / sizes) for v, J in zip(variances, jacobians, strict=True))
+    for v, (*_, taken) in zip(variances, asked, strict=True):
+        assert_allclose(taken * np.outer(sizes, sizes), 2 * G - G @ middle @ G / v, rtol=1e-8, atol=1e-12)

@@ -813,3 +813,139 @@ def test_a_fit_of_as_many_numbers_as_values_counts_one_degree_of_freedom(values,
     problem = SimpleNamespace(values=values, lags_s=(1e-2, 2e-2, 3e-2, 4e-2, 5e-2))
     fit = pole_zero.Fitted(problem, PoleZero((Root(30.0, 0.2),), (Root(45.0, None),), 1e-3), 5.0)
     assert (fit.parameters, fit.freedom) == (11, freedom)
+
+
+# ------------------------------------------------------------------------------------------ one axis, part by part
+FALLING = np.array([-2.0, 0.5, 0.3, -0.1])  # gain, its imaginary part and the weights of two lags
+
+
+def test_a_response_is_freed_of_delay_creep_and_the_loss_of_a_gain_that_falls():
+    freq = np.array([1.0, 3.0, 25.0, 80.0])
+    at_once = response_by_hand(replace(AT, delay_s=0.0), freq, FALLING[0])
+    lags = 0.3 / (1 + 2j * np.pi * freq * 0.02) - 0.1 / (1 + 2j * np.pi * freq * 0.5)
+    whole = ((1 - 0.25j) * at_once + lags) * np.exp(-2j * np.pi * freq * 3e-3)
+    response = SimpleNamespace(freq_hz=freq, response=whole[:, None, None], hold="band-limited", rate_hz=None)
+    fit = SimpleNamespace(at=AT, gains=FALLING, problem=SimpleNamespace(lags_s=(0.02, 0.5)))
+    assert_allclose(axis._freed(fit, response)[:, 0, 0], at_once, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("chi_square", "inflated"), [(40.0, 4.0), (2.5, 1.0)])
+def test_errors_of_an_axis_are_those_of_its_numbers_and_no_smaller_than_the_scatter(chi_square, inflated):
+    """The gain falls; of the zeros the pair alone lies below half of the sample rate."""
+    problem, _ = problem_of()
+    top, numbers = problem.highest_hz, problem.pack(AT)
+    sizes = np.array([0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 50.0, 60.0])
+    covariance = np.diag(sizes**2)
+    covariance[0, 1] = covariance[1, 0] = 0.5 * sizes[0] * sizes[1]
+    fit = SimpleNamespace(
+        problem=problem,
+        at=AT,
+        gains=FALLING,
+        covariance=covariance.copy,
+        chi_square=chi_square,
+        freedom=10,
+        modes=lambda: pole_zero.modes_of(AT, FALLING[0], (), ()),
+    )
+    modes, known = axis._known(fit, 7.0, 80.0)
+    assert modes.delay_s == 3e-3
+    pair, zero = AT.poles[0].values[0], AT.zeros[1].values[0]
+    assert_allclose(known.poles_rad_s, [-TURN * 12, -TURN * 70, pair, pair.conjugate()], rtol=1e-12)
+    assert_allclose(known.zeros_rad_s, [zero.conjugate(), zero], rtol=1e-12)
+
+    def by_damping(root):
+        return TURN * root.frequency_hz * complex(-1.0, -root.damping / math.sqrt(1.0 - root.damping**2))
+
+    both = covariance[0, 1] * (pair * by_damping(AT.poles[0]).conjugate()).real
+    of_pair = np.sqrt(abs(pair * 0.01) ** 2 + abs(by_damping(AT.poles[0]) * 0.02) ** 2 + 2 * both)
+    of_zero = np.hypot(abs(zero) * 0.06, abs(by_damping(AT.zeros[1])) * 0.07)
+    more = math.sqrt(inflated)
+    expected = more * np.array([TURN * 12 * 0.03, TURN * 70 * 0.04, of_pair, of_pair])
+    assert_allclose(known.poles_error_rad_s, expected, rtol=1e-6)
+    assert_allclose(known.zeros_error_rad_s, more * np.array([of_zero, of_zero]), rtol=1e-6)
+    assert known.delay_error_s == pytest.approx(more * 0.08 / (TURN * top), rel=1e-6)
+    assert known.dc_gain[0, 0] == pytest.approx(-2.0) and known.dc_gain_error[0, 0] == pytest.approx(more * 2.0 * 0.09)
+
+    def edge(step):
+        moved = problem.unpack(numbers + step[:8], AT)
+        return abs(response_by_hand(moved, np.array([7.0]), -2.0 * (1.0 + step[8]))[0])
+
+    slope = np.array([(edge(s) - edge(-s)) / 2e-6 for s in 1e-6 * np.eye(9)])
+    assert known.edge_gain[0, 0] == pytest.approx(edge(np.zeros(9)))
+    error = more * math.sqrt(slope @ covariance[:9, :9] @ slope)
+    assert known.edge_gain_error[0, 0] == pytest.approx(error, rel=1e-5)
+    assert all(np.shape(v) == (1, 1) for v in (known.dc_gain, known.dc_gain_error, known.edge_gain))
+    assert np.shape(known.edge_gain_error) == (1, 1)
+
+
+def scored(poles, criterion, error):
+    at = PoleZero(poles, (), 0.0)
+    return SimpleNamespace(at=at, parameters=3, chi_square=7.0, freedom=5, criterion=criterion, output_error_rms=error)
+
+
+@pytest.mark.parametrize(("criterion", "kept"), [(6.0, 0.2), (4.0, 0.9)])
+def test_the_scan_of_an_axis_has_the_better_of_two_models_of_an_order_and_a_residual_without_loss(
+    monkeypatch, criterion, kept
+):
+    """Orders 3 and 1 and then 3 once more; with creep a model makes all but the loss of what is measured."""
+    freq = np.array([2.0, 5.0, 9.0])
+    one = np.ones((1, 1), dtype=complex)
+    own, whole = (modal.ModalModel(np.array([-p + 0j]), one, p * one, np.zeros((1, 1))) for p in (20.0, 30.0))
+    fit = scored((Root(5.0, 0.1), Root(9.0, None)), criterion, 0.9)
+    fit.gains, fit.modes = FALLING, lambda creep: whole if creep else None
+    fits = [scored((Root(4.0, 0.1), Root(8.0, None)), 5.0, 0.2), scored((Root(3.0, None),), 50.0, 0.3)]
+    left = np.array([0.1, 0.2j, -0.3])[:, None, None]
+    measured = whole.response(freq) - 0.25j * own.response(freq) + left
+    response = SimpleNamespace(
+        freq_hz=freq, response=measured, hold="band-limited", rate_hz=150.0, excited_hz=(2.0, 9.0)
+    )
+    monkeypatch.setattr(axis, "_known", lambda *given: (own, given))
+    monkeypatch.setattr(axis, "axis_error", lambda *given: given)
+    monkeypatch.setattr(axis, "with_evidence", lambda *given: given)
+    model, records, errors, of, residual, known, scan, reason = axis._linear_fit(["a", "b"], response, fit, fits)
+    assert model is own and records == ["a", "b"] and of is response and known == (fit, 2.0, 150.0)
+    assert errors == [(own, record, "band-limited") for record in "ab"]
+    assert_allclose(residual, left, atol=1e-12)
+    assert [(s.order, s.criterion, s.output_error_rms) for s in scan] == [
+        (1, 50.0, 0.3),
+        (3, min(criterion, 5.0), kept),
+    ]
+    assert reason.startswith("order 3 has the least criterion, ") and "order 1 is worse by" in reason
+    assert len(axis._linear_fit([], response, fit, fits[1:])[6]) == 2
+
+
+def test_what_an_estimate_adds_of_itself_is_taken_off_exactly_where_the_model_made_the_records():
+    """Two drives that begin beside zero, from which the model begins at rest."""
+    one = np.ones((1, 1), dtype=complex)
+    model = modal.ModalModel(np.array([-3.0 + 40j]), one, (2.0 + 1j) * one, np.zeros((1, 1)))
+    records = []
+    for seed in (1, 2):
+        drive = 5.0 * seed + philox(seed).standard_normal((1500, 1))
+        record = recording_from_arrays(drive, drive, 100.0)
+        output = modal.simulate(model, drive - drive[:1], 100.0, "first-order")
+        records.append(replace(record, output=output))
+    response = replace(response_from_records(records, bands=500), hold="first-order")
+    true = model.response(response.freq_hz, "first-order", 100.0)
+    assert np.abs(response.response / true - 1).max() > 1e-3
+    found = axis._unbiased(records, response, SimpleNamespace(modes=lambda creep: model if creep else None))
+    assert_allclose(found.response, true, rtol=1e-8)
+    assert_allclose(found.standard_error, response.standard_error)
+
+
+def test_a_zero_on_the_right_near_the_end_of_the_band_may_become_a_pole_there():
+    at = PoleZero((Root(30.0, 0.2),), (Root(-60.0, None),), 1e-3)
+    found = pole_zero._others(SimpleNamespace(at=at, problem=SimpleNamespace(highest_hz=100.0)))
+    (turned,) = (one for one in found if len(one.poles) == 2)
+    assert turned.poles == (Root(30.0, 0.2), Root(100.0, None)) and turned.zeros == ()
+    assert turned.delay_s == pytest.approx(1e-3 + 1 / (TURN * 60) - 1 / (TURN * 100))
+    low = replace(at, zeros=(Root(-49.0, None),))
+    found = pole_zero._others(SimpleNamespace(at=low, problem=SimpleNamespace(highest_hz=100.0)))
+    assert all(len(one.poles) == 1 for one in found) and len(found) == 2
+
+
+@pytest.mark.parametrize("damping", [0.03, 0.4])
+def test_a_pair_that_goes_leaves_the_turn_of_phase_of_its_damping_to_the_delay(damping):
+    """At low frequencies a pair is late by twice its damping over its angular frequency."""
+    linear = LinearPoles(Roots((400.0, 90.0), (damping, 0.1)), Roots((), ()), 30.0, 1e-4)
+    (fewer,) = _fewer_poles(fitted_to(linear, (100.0, 0.1)))
+    assert fewer.poles == Roots((90.0,), (0.1,)) and fewer.zeros == Roots((), ())
+    assert fewer.delay_s == pytest.approx(1e-4 + 2 * damping / (2 * math.pi * 400.0))

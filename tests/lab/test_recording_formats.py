@@ -27,8 +27,8 @@ from microrad.lab.recording import RecordingError, files, multisine_recordings, 
 from microrad.lab.recording.formats import text as text_format
 from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels_of, indexed, rates_of, stated_rate
 from microrad.lab.recording.formats.hdf5 import _lzf_bytes, _unpacked_bytes, unusable_dataset
-from microrad.lab.recording.formats.lvm import LvmSource, _Blanks
-from microrad.lab.recording.formats.source import Container, StatedRate, is_time_name, time_unit
+from microrad.lab.recording.formats.lvm import LvmSource, _Blanks, _count_lines
+from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged, is_time_name, time_unit
 from microrad.lab.recording.formats.tdms import TdmsSource, _check_scales, _Listener, check_structure
 from microrad.lab.recording.reader import open_source
 from microrad.lab.recording.records import digest_of
@@ -2586,3 +2586,120 @@ def test_lvm_segments_with_a_clock_of_another_form_have_no_start(tmp_path, writt
     source = LvmSource(path)
     assert source.names == ("0/drive", "0/output", "1/drive", "1/output")
     assert source._start_s(source._segments[0]) is None
+
+
+@pytest.mark.parametrize("ending", ["", "\n"])
+def test_lines_of_an_lvm_file_are_counted_beyond_what_is_looked_through_at_once(ending):
+    """By 16 MB at a time: the second part has the fewer lines, and the last line may have no end."""
+    data = b"head\n" + b"1\t2\n" * (4 << 20) + b"33333333\n" * 1000 + b"5\t6" + ending.encode()
+    assert len(data) > 1 << 24
+    assert _count_lines(data, 5, len(data)) == (4 << 20) + 1001
+    assert _count_lines(data, 5, 13) == 2 and _count_lines(data, 5, 12) == 2 and _count_lines(data, 5, 5) == 0
+
+
+@pytest.mark.parametrize("blank", ["", "\t", "\t\t\t"])
+def test_names_of_lvm_columns_end_where_only_blank_cells_follow(tmp_path, blank):
+    path = tmp_path / "a.lvm"
+    path.write_text(LVM_HEAD + lvm_segment(names=f"X_Value\tu\ty{blank}"), encoding="latin-1")
+    source = open_source(path)
+    assert source.names == ("X_Value", "u", "y")
+    assert [column[2] for column in source.load([1, 2])] == [math.sin(2), math.cos(2.2)]
+
+
+def test_of_twelve_channels_of_one_last_name_ten_are_told(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for k in range(12):
+            file[f"g{k:02d}/u"] = DRIVE + k
+    listed = ", ".join(f"'g{k:02d}/u'" for k in range(10))
+    message = refusal(tmp_path / "a.h5", 0, "u", RATE_HZ)
+    assert message == f"{tmp_path / 'a.h5'}: 'u' may be {listed}; give the output by its full name."
+    read = read_recording(tmp_path / "a.h5", "g11/u", "g03/u", RATE_HZ, accept=("unexcited", "lead", "dead"))
+    assert read.drive[0, 0] - read.output[0, 0] == pytest.approx(8.0)
+
+
+def test_of_records_five_of_seven_names_are_told():
+    made = np.zeros(9, dtype=[(f"part_{k}", float) for k in range(7)])
+    unusable = {}
+    assert channels_of([Variable("r", made.shape, made.dtype, made.__getitem__, "")], unusable) == ()
+    assert unusable == {
+        "r": "holds records of part_0, part_1, part_2, part_3, part_4; save each of these as an array of its own"
+    }
+
+
+def test_of_a_file_of_whole_arrays_alone_five_reasons_are_told_of_what_is_no_channel(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, cube=np.zeros((300, 2, 3)), **{f"n{k}": np.array(f"text {k}") for k in range(7)})
+    whole = (
+        "'cube' is an array of shape (300, 2, 3): name one channel of it with an index for each axis but the samples', "
+        "'cube[0, 0]', or read it whole by saying what each axis is: --axes (axes), such as "
+        "samples,channels,realisations,periods"
+    )
+    texts = "; ".join(f"'n{k}' holds text, not real numbers; save numbers, or name another" for k in range(4))
+    assert refusal(path, 3, 1, RATE_HZ) == (
+        f"{path}: there is no input channel 3: the NumPy file has 0 channels, numbered from 0 ({whole}; {texts})."
+    )
+
+
+@pytest.mark.parametrize(("wanted", "nearest"), [("gama", "GAMMA"), ("BETTA", "beta"), ("ALPH", "Alpha"), ("Q", "")])
+def test_the_nearest_name_is_found_in_small_and_large_letters(tmp_path, wanted, nearest):
+    path = tmp_path / "a.npz"
+    np.savez(path, Alpha=DRIVE, beta=OUTPUT, GAMMA=OUTPUT)
+    listed = "The channels are 'Alpha', 'beta', 'GAMMA'; a number counted from 0 does as well."
+    message = refusal(path, 0, wanted, RATE_HZ)
+    assert message.startswith(f"{path}: no output channel is named '{wanted}'; ") and message.endswith(listed)
+    assert not nearest or f"'; the nearest is '{nearest}'. The" in message
+
+
+@pytest.mark.parametrize(
+    ("wanted", "named"), [("y[0]", "run/y[0]"), ("run/y[0]", "run/y[0]"), ("y[1]", "run/y"), ("z[3, 1]", "run/z")]
+)
+def test_what_is_no_channel_is_told_by_its_whole_name_before_that_of_its_array(tmp_path, wanted, named):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["u"], file["run/y[0]"], file["run/y"], file["run/z"] = DRIVE, DRIVE + 1j, DRIVE > 6, np.array([b"a", b"b"])
+    reason = {"run/y[0]": "holds complex numbers", "run/y": "holds booleans", "run/z": "holds text"}[named]
+    message = refusal(path, "u", wanted, RATE_HZ)
+    assert message.startswith(f"{path}: the output '{wanted}' is no channel: '{named}' {reason}, not real numbers; ")
+
+
+def test_the_time_of_channels_is_the_first_of_their_length_that_is_not_used_itself():
+    lengths = {"time": 7, "y": 5, "t": 5, "g/time_ms": 5, "z": 7}
+    channels = tuple(Channel(name, samples, lambda: np.zeros(1)) for name, samples in lengths.items())
+    source = Container(Path("a"), "HDF5", channels, "")
+    assert [source.find_time(used) for used in ([1], [4], [1, 2], [2], [3, 1], [0], [4, 1], [1, 4], [1, 2, 3])] == [
+        *(2, 0, 3, 3, 2, None, 0, 2, None)
+    ]
+    assert source.samples() == (7, 5, 5, 5, 7)
+
+
+def test_a_rate_of_several_channels_is_stated_once_and_each_other_one_in_their_order():
+    rates = {"": StatedRate(1.0, "all"), "b": StatedRate(2.0, "b"), "b/x": StatedRate(3.0, "x")}
+    own = StatedRate(4.0, "own")
+    names = {"b/y": None, "b/z": None, "b/x[2]": None, "c/d": None, "b/w": own, "e": own}
+    channels = tuple(Channel(name, 5, lambda: np.zeros(1), "", rate) for name, rate in names.items())
+    source = Container(Path("a"), "HDF5", channels, "", {}, {name: (rate,) for name, rate in rates.items()})
+    assert [rate.words for rate in source.rates(range(6))] == ["b", "x", "all", "own"]
+    assert [rate.words for rate in source.rates([5, 3, 0, 1])] == ["own", "all", "b"]
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(OSError("first\nsecond"), "first"), (KeyError(), "KeyError"), (ValueError(""), "ValueError"), (OSError(5), "5")],
+)
+def test_of_what_a_library_says_of_a_file_the_first_line_is_told(error, said):
+    assert str(damaged(Path("a.h5"), "an HDF5 file", error)) == (
+        f"a.h5: this cannot be read as an HDF5 file ({said}); the file is damaged or truncated: copy it again from its "
+        "source."
+    )
+
+
+def test_samples_of_a_square_array_run_along_its_first_axis():
+    values = np.arange(36.0).reshape(6, 6)
+    made = [Variable("a", values.shape, values.dtype, values.__getitem__, "V")]
+    found = channels_of(made, {})
+    assert [(each.name, each.samples, each.unit) for each in found] == [(f"a[{k}]", 6, "V") for k in range(6)]
+    assert [each.load().tolist() for each in found] == values.T.tolist()
+    cube = np.arange(75.0).reshape(3, 5, 5)
+    source = Container(Path("a"), "NumPy", found, "")
+    one = indexed(source, [Variable("c", cube.shape, cube.dtype, cube.__getitem__, "")], "c[2, 4]")
+    assert one.load().tolist() == cube[2, :, 4].tolist() and one.samples == 5

@@ -1428,3 +1428,115 @@ def test_joint_forms_are_bounded_where_that_is_asked_for_and_not_by_what_other_m
     with pytest.raises(AskedError) as told:
         choice.identify([straight()], models=(model,), admissible=admissible, output_unit="urad")
     assert told.value.args == (admissible,)
+
+
+class ReachedError(Exception):
+    """Raised where the fits would begin, with what they would be made of."""
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_what_is_fitted_is_the_heads_of_loops_and_whole_periods_of_what_is_a_loop_too(monkeypatch, alone):
+    """Two loops, the second of which is broadband as well, beside a broadband record of one period and a half."""
+    first, second = of(400, "a"), replace(of(300, "b"), period_samples=50)
+    wide, other = replace(of(150, "w"), period_samples=100), of(200, "x", rate_hz=20.0)
+    response = [wide] if alone else [wide, second]
+    served = choice.roles([first, second])._replace(
+        response=response, broadband=[*response, other], loops=[first, second]
+    )
+    asked = []
+
+    def linear_part(*given):
+        asked.append(given)
+        return "linear"
+
+    def supported(models, prepared, has_linear):
+        asked.append((models, prepared, has_linear))
+        return models, []
+
+    def made(**given):
+        raise ReachedError(given)
+
+    monkeypatch.setattr(choice, "roles", lambda recordings: served)
+    monkeypatch.setattr(choice, "split_points", lambda loops, hold_out, validated: [250, 170])
+    monkeypatch.setattr(choice, "fit_linear_part", linear_part)
+    monkeypatch.setattr(choice, "supported_models", supported)
+    monkeypatch.setattr(choice, "Candidates", made)
+    with pytest.raises(ReachedError) as reached:
+        choice.identify(
+            [first, second, wide, other],
+            models=("bouc_wen", "prandtl_ishlinskii", "bouc_wen_admissible"),
+            admissible=True,
+            seed=5,
+            output_unit="urad",
+            input_unit="mV",
+            hold="first-order",
+            validation=[of(220, "v")],
+        )
+    (given,) = reached.value.args
+    (parts, units, models, hold, _), (_, prepared, has_linear) = asked
+    assert models == ("bouc_wen_admissible", "prandtl_ishlinskii") and (hold, has_linear) == ("first-order", True)
+    expected = [("w", 150, None)] if alone else [("w", 150, 100), ("b", 150, 50)]
+    assert [(r.path, r.samples, r.period_samples) for r in parts] == expected
+    assert [r.samples for r in given["heads"]] == [250, 170] and given["splits"] == [250, 170]
+    assert [r.path for r in given["broadband"]] == ["w"] and given["linear"] == "linear"
+    assert [r.path for r in given["validation"]] == ["v"] and [r.path for r in given["loops"]] == ["a", "b"]
+    largest = max(np.ptp(first.output[:250]), np.ptp(second.output[:170]))
+    assert given["span_rad"] == pytest.approx(1e-6 * largest) and units == Units("mV", "urad")
+    assert (given["seed"], given["admissible"], given["hold"]) == (5, True, "first-order")
+    assert [r.drive_v.size for r in prepared] == [250, 170]
+
+
+def test_an_identification_has_the_drives_of_all_loops_and_tests_the_longest_part_that_no_fit_saw(monkeypatch):
+    """Two loops and a record for validation: the second loop has the most held-out samples, and the lowest drive."""
+    records = [of(10, "a"), of(8, "b"), of(9, "v")]
+    ends = [(1, 6), (0, 2), (0, 4)]
+    models = [np.array(of(n).output[:, 0]) * size for n, size in ((10, 1.0), (8, 0.5), (9, 30.0))]
+    seen = [
+        predictions.Prediction(m, m + 1e-3 * np.arange(m.size), start, split, 0)
+        for m, (start, split) in zip(models, ends, strict=True)
+    ]
+    fits = [SimpleNamespace(name=name, rate_limit_v_per_s=limit) for name, limit in (("p", 10.0), ("q", 20.0))]
+    prepared = tuple(SimpleNamespace(drive_v=np.array(drive)) for drive in ([-1.0, 3.0], [-4.0, 2.0]))
+    line = predictions.Score("straight line", 9.0, 9.0, 90.0, 90.0)
+    own = candidates_of(loops=records[:2], splits=[6, 2], validation=(records[2],))
+
+    def scores(self, name, given):
+        return line if name == "straight line" else predictions.Score(name, 1.0, 2.0, float(len(name)), 4.0)
+
+    monkeypatch.setattr(candidates.Candidates, "score", scores)
+    told = {}
+
+    def saying(name, answer):
+        def say(*given):
+            told[name] = given
+            return answer
+
+        monkeypatch.setattr(choice, name, say)
+
+    names = ("range", "score", "fit", "rate", "split", "set_aside", "held_out", "residual")
+    for name in names:
+        saying(f"{name}_warnings", [name])
+    saying("drift", (7e-6, ["drift"]))
+    saying("residual_test", "test")
+    saying("straight_line", "line")
+    saying("_reason", "It is best.")
+    saying("_rests_on", "It rests.")
+    saying("_unsupported", "")
+    saying("evidence", "evidence")
+    others = tuple(replace(p, model_rad=0 * p.model_rad) for p in seen)
+    found = choice._identification(own, prepared, fits, [others, tuple(seen)], 1, ["refused"], ("source",), ["note"])
+    assert (found.chosen, found.drive_min_v, found.drive_max_v, found.bias_v) == ("q", -4.0, 3.0, -0.5)
+    assert (found.rate_limit_v_per_s, found.drift_rad, found.residual) == (20.0, 7e-6, "test")
+    assert found.travel_rad == pytest.approx(max(np.ptp(models[0][1:6]), np.ptp(models[1][:2])))
+    residual, drive = told["residual_test"]
+    assert_allclose(residual, 1e-3 * np.arange(2, 8))
+    assert drive.tolist() == records[1].drive[2:, 0].tolist()
+    before, after = names[:3], names[4:]
+    assert found.warnings == (*before, "drift", "rate", "note", *after)
+    assert told["range_warnings"] == ((-4.0, 3.0), 20.0) and told["fit_warnings"] == (fits[1],)
+    assert told["rate_warnings"] == (prepared, fits[1]) and told["split_warnings"][1:] == ([6, 2], 1e-3)
+    assert told["straight_line"][0] is prepared and told["straight_line"][2] == [6, 2, 0]
+    assert told["score_warnings"] == (found.scores[1], line) and told["held_out_warnings"][2] == (-4.0, 3.0)
+    assert [each.model for each in found.scores] == ["p", "q"] and found.straight_line is line
+    assert found.reason == "It is best. It rests." and found.refused == ("refused",) and found.sources == ("source",)
+    assert [r.path for r in found.recordings] == ["a", "b", "v"] and found.predictions[1] == tuple(seen)

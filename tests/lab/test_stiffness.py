@@ -1756,3 +1756,29 @@ def test_a_fit_is_trusted_by_steps_so_fine_that_its_polynomial_goes_on_as_far_as
     assert found.open == pytest.approx(np.sqrt(np.mean((0.1 * (np.clip(s, -1, 1) ** 3 - s**3)) ** 2)), rel=1e-6)
     assert found.left == pytest.approx(0.04 * np.sqrt(8.0)) and found.motion == pytest.approx(2.0)
     assert found.error_rms == pytest.approx(np.hypot(found.left, found.open))
+
+
+def test_errors_are_judged_record_by_record_and_motions_are_the_largest_of_all(monkeypatch):
+    """Three records, two outputs and two operators, the first of which goes farthest the other way."""
+    errors = {"a": [[3.0, 4.0], [0.0, 1.0]], "b": [[6.0, 0.0]], "c": [[1.0, 1.0], [1.0, 1.0]]}
+    motions = {"a": [[1.0, -2.0], [0.5, 2.5]], "b": [[-4.0, 1.0]], "c": [[3.0, 2.0]]}
+    asked = []
+
+    def plant(numbers, step_s):
+        asked.append((numbers.delay_s, step_s))
+        return "plant"
+
+    def error(own, record, delay_s):
+        assert own == "plant" and delay_s == 2e-4
+        return np.array(errors[record.name]), SimpleNamespace(q=np.array(motions[record.name])), None
+
+    monkeypatch.setattr(fit_of.tangents, "play_plant", plant)
+    monkeypatch.setattr(fit_of.tangents, "steady_error", error)
+    search = SimpleNamespace(
+        springs=SimpleNamespace(numbers=lambda free: SimpleNamespace(delay_s=free)),
+        records=[SimpleNamespace(name=name, step_s=step) for name, step in zip("abc", (0.25, 0.5, 0.75), strict=True)],
+        pool=SimpleNamespace(map=map),
+    )
+    rms, largest = fit_of._judged(search, 2e-4)
+    np.testing.assert_allclose(rms, [np.sqrt(26 / 4), np.sqrt(18.0), 1.0])
+    assert largest.tolist() == [4.0, 2.5] and asked == [(2e-4, 0.25)]

@@ -320,3 +320,47 @@ def test_a_drive_that_moves_one_output_at_one_line_is_judged_by_the_noise_of_tha
         check_wiring("u.npy", noisy, TWO, None)
     else:
         assert f"the drive 'u{drive}' moves nothing" in refusal(noisy, None, TWO)
+
+
+@pytest.mark.parametrize("known", [1, 3, 4])
+def test_positions_of_some_displacements_are_not_enough_however_many_they_are(known):
+    """One more displacement has none, wherever it stands."""
+    for at in (0, known):
+        outputs = placed_at(PLACES[:known])
+        outputs.insert(at, Output("w", "displacement"))
+        told = refusal(made(tilted(PLACES[: known + 1])), None, outputs)
+        assert told == (
+            f"u.npy: the positions do not give the tilts: {known} of {known + 1} displacements have a position; two "
+            "tilts and a piston take at least three, and the position of each; or leave the positions out (--position, "
+            "positions)."
+        )
+
+
+@pytest.mark.parametrize("reversed_one", [0, 1])
+def test_four_displacements_are_enough_to_find_the_reversed_one(reversed_one):
+    places = ((0.01, 0.0), (0.0, 0.02), (-0.015, 0.001), (0.002, -0.03))
+    gain = tilted(places, piston=5.0)
+    check_wiring("u.npy", made(gain), placed_at(places), None)
+    gain[reversed_one] *= -1
+    told = refusal(made(gain), None, placed_at(places))
+    assert f"where the output 'y{reversed_one}' is reversed: check the wiring, or correct positions." in told
+
+
+def test_a_drive_moves_something_where_it_does_at_half_of_the_lines_each_beside_its_own_noise():
+    """Of five lines three have thrice the power of their noise, and two a tenth, one of them of great noise."""
+    noise = np.array([1.0, 10.0, 100.0, 60.0, 1e6])
+    for ratio, moves in (([3.0, 3.0, 3.0, 0.1, 0.1], True), ([3.0, 3.0, 0.1, 0.1, 0.1], False)):
+        response = made(((1.0, 1.0),))
+        shape = (5, 1, 1)
+        power = np.sqrt(noise * ratio).reshape(shape)
+        steady = np.full(shape, 1e4)
+        response = replace(
+            response,
+            freq_hz=np.arange(1.0, 6.0),
+            response=np.concatenate([steady, power], axis=2) + 0j,
+            standard_error=np.repeat(np.sqrt(noise).reshape(shape), 2, axis=2),
+        )
+        if moves:
+            check_wiring("u.npy", response, TWO[:1], None)
+        else:
+            assert "the drive 'u1' moves nothing" in refusal(response, None, TWO[:1])
