@@ -367,3 +367,66 @@ def test_a_draft_beside_a_file_goes_whatever_it_has_become(tmp_path):
     with folder.whole_file(tmp_path / "b") as draft:
         draft.write_text("b")
     assert (tmp_path / "b").read_text() == "b"
+
+
+@pytest.fixture
+def processes(monkeypatch):
+    """Answers to who asks for a process: none has the number 1 to 99, those from 100 on are another user's or live."""
+
+    def asked(process, signal):
+        assert signal == 0
+        if process < 100:
+            raise ProcessLookupError(errno.ESRCH, "No such process")
+        if process < 200:
+            raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(folder.os, "kill", asked)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+@pytest.mark.parametrize(("process", "gone"), [(7, True), (150, False), (250, False)])
+def test_a_process_of_another_user_is_there_and_what_is_no_file_or_folder_is_nobodys(
+    tmp_path, processes, process, gone
+):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("x")
+    os.mkfifo(tmp_path / "pipe")
+    found = [folder._left_behind(tmp_path / name, process) for name in ("folder", "file", "pipe")]
+    assert found == [gone, gone, False]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+@pytest.mark.parametrize("name", ["results", ".a+b (1)", "x.y"])
+def test_all_that_gone_processes_left_of_a_name_goes_and_nothing_of_another_name(tmp_path, processes, name):
+    """What cannot be asked for, or lives, ends no search for the others."""
+    begin = folder._on_this_machine(name)
+    gone = [f"{begin}{process}-a_{process}.old" for process in (1, 7, 99)]
+    stay = [f"{begin}{process}-ab.old" for process in (100, 150, 250)]
+    stay += [f"{begin}7-abxold", f"{begin}7-ab.old2", f"{begin}7-ab", f"{begin}7-a-b.old", f"{begin}-ab.old"]
+    stay += [f"{begin}1234567890-ab.old", f"{begin}x7-ab.old", f"x{begin}7-ab.old", f"{begin.upper()}7-ab.old"]
+    stay += ["resultss-7-ab.old", f"{name}-7-ab.old", begin.replace(".", "_").replace("+", "aa") + "_7-ab.old"]
+    for number, each in enumerate([*gone, *stay]):
+        if number % 2:
+            (tmp_path / each).mkdir()
+            (tmp_path / each / "inside").write_text("x")
+        else:
+            (tmp_path / each).write_text("x")
+    folder._sweep(tmp_path, name, ".old")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(stay)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, PermissionError(13, "Permission denied")])
+def test_old_results_are_put_back_whatever_ends_the_move_of_the_new_ones(tmp_path, monkeypatch, error):
+    results, rename = tmp_path / "results", Path.rename
+    results.mkdir()
+    (results / "manifest.json").write_text('{"versions": {"microrad": "0"}, "mission": 1}', "utf-8")
+
+    def ended(path, target):
+        if path.suffix == ".part":
+            raise error
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", ended)
+    with pytest.raises(error if isinstance(error, type) else PermissionError), whole_folder(results, True) as draft:
+        (draft / "b").write_text("b")
+    assert [path.name for path in tmp_path.rglob("*")] == ["results", "manifest.json"]

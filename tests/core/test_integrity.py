@@ -147,3 +147,47 @@ def test_of_a_record_the_digests_of_the_packages_own_files_count(tmp_path, monke
 
     monkeypatch.setattr(integrity.metadata, "files", absent)
     assert integrity._recorded() == {}
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [(5, "0.py, 1.py, 2.py, 3.py, 4.py"), (6, "0.py, 1.py, 2.py, 3.py, 4.py and 1 more")],
+)
+def test_five_files_are_named_and_the_others_counted(count, said):
+    found = Integrity("commit 1", missing=MANY[:count], added=("new.py",))
+    assert found.text == f"Against the commit 1: {count} missing ({said}); 1 added (new.py)."
+
+
+def test_libraries_of_other_versions_stand_in_the_order_of_the_libraries(monkeypatch):
+    others = {"sgp4": "sgp4 9", "other": "other 1", "scipy": "scipy 3", "numpy": "numpy 1"}
+    monkeypatch.setattr(integrity, "_recorded", lambda: {"a.py": "x"})
+    monkeypatch.setattr(integrity, "_against_record", lambda record: Integrity("record of the wheel", tuple(record)))
+    monkeypatch.setattr(integrity, "other_versions", lambda: others)
+    found = integrity.integrity()
+    assert found == Integrity("record of the wheel", ("a.py",), versions=("numpy 1", "scipy 3", "sgp4 9"))
+
+
+def test_version_control_is_asked_for_each_new_file_of_the_package_alone(tmp_path, monkeypatch):
+    """A file of a new folder by its own name, one that is ignored and one beside the package not at all."""
+
+    def git(*words):
+        person = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", *person, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    package = tmp_path / "src" / "microrad"
+    (package / "new").mkdir(parents=True)
+    for name in ("same.py", "changed.py", "gone.py"):
+        (package / name).write_text(name, encoding="utf-8")
+    (tmp_path / ".gitignore").write_text("*.pyc\n", encoding="utf-8")
+    git("init", "--quiet")
+    git("add", ".")
+    git("commit", "--quiet", "--message", "all")
+    (package / "changed.py").write_text("other", encoding="utf-8")
+    (package / "gone.py").unlink()
+    for name in ("new/one.py", "new/two.py", "new/one.pyc", "../beside.py"):
+        (package / name).write_text("new", encoding="utf-8")
+    monkeypatch.setattr(integrity, "_PROJECT", tmp_path)
+    found = integrity._against_commit()
+    assert (found.changed, found.missing, found.added) == (("changed.py",), ("gone.py",), ("new/one.py", "new/two.py"))
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert found.against == f"commit {head[:12]}"

@@ -521,3 +521,97 @@ def test_the_code_of_a_number_is_known_by_its_files_and_not_by_what_is_compiled_
         (core / name).write_text("2")
         known.add(machine.source_sha256.__wrapped__())
     assert len(known) == 3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
+@pytest.mark.parametrize(
+    ("above", "below", "said"),
+    [
+        ((1000, 0o755), (1000, 0o755), ""),
+        ((1000, 0o755), (1000, 0o775), "others may write into {below}"),
+        ((1000, 0o710), (1000, 0o775), "others may write into {below}"),  # the group may enter
+        ((1000, 0o701), (1000, 0o777), "others may write into {below}"),  # all but the group may
+        ((1000, 0o700), (1000, 0o777), ""),
+        ((1000, 0o766), (1000, 0o777), ""),
+        ((0, 0o700), (1000, 0o777), "others may write into {below}"),  # it is not the user who keeps others out
+        ((1000, 0o777), (1000, 0o700), "others may write into {above}"),
+        ((1000, 0o757), (1000, 0o711), "others may write into {above}"),
+        ((1000, 0o1777), (1000, 0o1777), ""),
+        ((0, 0o775), (1000, 0o755), "others may write into {above}"),
+        ((0, 0o1777), (0, 0o755), ""),
+        ((1001, 0o755), (1000, 0o755), "{above} is another user's"),
+        ((1001, 0o1777), (1000, 0o777), "{above} is another user's"),
+        ((1000, 0o755), (1001, 0o700), "{below} is another user's"),
+        ((1000, 0o700), (1001, 0o755), ""),
+    ],
+)
+def test_a_folder_is_the_users_alone_by_who_may_enter_and_change_those_above_it(
+    tmp_path, monkeypatch, above, below, said
+):
+    """Of two folders above it the user and the mode are given; those above these are the system's."""
+    outer, inner = tmp_path / "above", tmp_path / "above" / "below"
+    place = inner / "parts"
+    place.mkdir(parents=True)
+    known = {outer: above, inner: below, place: (1000, 0o700)}
+
+    def owned(path, **_):
+        found = os.lstat(path)
+        by, mode = known.get(path, (0, 0o755))
+        return os.stat_result((stat.S_IFDIR | mode, *found[1:4], by, *found[5:]))
+
+    monkeypatch.setattr(os, "getuid", lambda: 1000)
+    monkeypatch.setattr(kept.Path, "stat", owned)
+    monkeypatch.setattr(kept.Path, "lstat", owned)
+    if said:
+        with pytest.raises(PermissionError) as refused:
+            kept._refuse_others(place)
+        assert refused.value.strerror == said.format(above=outer, below=inner)
+    else:
+        kept._refuse_others(place)
+
+
+def test_a_damaged_part_goes_though_another_one_is_asked_for(place):
+    for gain in (2.0, 3.0):
+        Kept(place).part(samples, Inputs(gain), 3)
+    damaged = max(files(place), key=lambda file: file.stat().st_mtime_ns)
+    damaged.write_bytes(damaged.read_bytes()[:-1])
+    CALLS.clear()
+    Kept(place).part(samples, Inputs(2.0), 3)
+    assert CALLS == [] and not damaged.exists() and len(files(place)) == 1
+
+
+def test_of_the_results_of_a_part_those_that_were_used_last_stay(place, monkeypatch):
+    """The first is used again before there is one too many, so the second goes; another part has its own."""
+    monkeypatch.setattr(kept, "MOST_OF_A_PART", 4)
+    Kept(place).part(with_inputs, ONE)
+    for gain in range(4):
+        Kept(place).part(samples, Inputs(float(gain)), 3)
+    Kept(place).part(samples, Inputs(0.0), 3)
+    Kept(place).part(samples, Inputs(-1.0), 3)
+    CALLS.clear()
+    for gain in (0.0, -1.0, 2.0, 3.0):
+        Kept(place).part(samples, Inputs(float(gain)), 3)
+    assert CALLS == []
+    Kept(place).part(with_inputs, ONE)
+    Kept(place).part(samples, Inputs(1.0), 3)
+    assert CALLS[-1:] == [1.0] and len(files(place)) == 5
+
+
+@pytest.mark.parametrize(
+    ("most_bytes", "left"),
+    [(160, "abcd"), (159, "acd"), (100, "acd"), (99, "ac"), (30, "ac"), (29, "c"), (10, "c"), (9, ""), (0, "")],
+)
+def test_room_is_made_by_what_was_not_used_for_longest_in_all_folders(tmp_path, most_bytes, left):
+    """Parts of 20, 60, 10 and 70 bytes, the oldest last but b, in two folders; what else stands there counts not."""
+    now = time.time()
+    for name, size, age_s in (("one/a", 20, 20), ("two/b", 60, 40), ("two/c", 10, 10), ("one/d", 70, 30)):
+        path = tmp_path / f"{name}.part"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(bytes(size))
+        os.utime(path, (now - age_s, now - age_s))
+    (tmp_path / "one" / "notes.txt").write_bytes(bytes(1000))
+    for name in ("one", "two"):  # old, and not empty
+        os.utime(tmp_path / name, (now - 2 * kept.LONGEST_EMPTY_S,) * 2)
+    kept._make_room(tmp_path, most_bytes)
+    assert sorted(path.stem for path in tmp_path.rglob("*.part")) == list(left)
+    assert (tmp_path / "one" / "notes.txt").stat().st_size == 1000 and (tmp_path / "two").is_dir()

@@ -350,3 +350,27 @@ LISTED = replace(
 def test_of_records_in_lists_and_in_lists_of_a_mapping_those_that_are_read_count(function, seen, unseen):
     assert not agree(function, replace(LISTED, **seen), LISTED)
     assert agree(function, replace(LISTED, **unseen), LISTED)
+
+
+@pytest.mark.parametrize("place", [None, 3.0, "xyz", (), Beam(3.0), {}])
+@pytest.mark.parametrize(
+    "function", [lambda m: sorted(m.sources), lambda m: m.sources["a"][1].power_w, lambda m: "b" in m.sources]
+)
+def test_what_was_read_of_a_mapping_is_not_in_anything_else(function, place):
+    assert not agree(function, replace(LISTED, sources=place), LISTED)
+    assert agree(function, replace(LISTED, beams=place), LISTED)
+
+
+@pytest.mark.parametrize("function", [lambda m: list(m.sources), lambda m: len(m.sources), lambda m: {**m.sources}])
+def test_the_keys_of_a_mapping_are_known_in_the_order_that_they_stand_in(function):
+    sources = {"x": [Beam(3.0)], "b": [Beam(4.0)], "k": [Beam(5.0)]}
+    mission = replace(LISTED, sources=sources)
+    assert agree(function, replace(mission, sources=dict(sources), beams=[]), mission)
+    for keys in ("bkx", "xkb", "xb", "xbkz"):
+        assert not agree(function, replace(mission, sources={key: sources.get(key, []) for key in keys}), mission)
+
+
+def test_a_name_of_a_file_of_any_bytes_has_a_digest_of_its_own():
+    names = [os.fsdecode(each) for each in (b"a\xff.csv", b"a\xfe.csv", b"a.csv")]
+    assert len({digest(each) for name in names for each in (name, Path(name))}) == 6
+    assert digest(Path(names[0])) == digest(Path(os.fsdecode(b"a\xff.csv")))
