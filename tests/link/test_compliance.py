@@ -602,3 +602,25 @@ def test_an_entry_of_a_standard_is_read_with_each_of_its_keys_and_without_those_
     found_all = (*own, found.bit_error_ratio, found.outside)
     assert found_all[:3] + found_all[4:] == expected[:3] + expected[4:]
     assert found.values == pytest.approx(expected[3], rel=1e-12)
+
+
+@pytest.mark.parametrize(("acquisition", "possible", "expected"), [
+    ("scan", (True, False), (math.inf, "raster scan never ends in lock")),
+    ("scan", (False, True),
+     (7.0, "90 % of those that end in lock take no longer; 62.5 % of all searches by raster scan end in lock")),
+    ("wide beacon", (False, True), (math.inf, "wide beacon never ends in lock")),
+    ("wide beacon", (True, False),
+     (3.0, "90 % of those that end in lock take no longer; 81.2 % of all searches by wide beacon end in lock")),
+])  # fmt: skip
+def test_the_time_to_lock_is_that_of_the_way_by_which_the_mission_searches(acquisition, possible, expected):
+    wide, by_scan = (
+        SimpleNamespace(name=name, possible=may, early_s=early, outcome=SimpleNamespace(success_probability=share))
+        for name, may, early, share in zip(
+            ("wide beacon", "raster scan"), possible, (3.0, 7.0), (0.8125, 0.625), strict=True
+        )
+    )
+    mission = SimpleNamespace(operations=SimpleNamespace(acquisition=acquisition))
+    finding = SimpleNamespace(wide=wide, scan=by_scan, scanned=object())
+    study = SimpleNamespace(file=SimpleNamespace(mission=mission), finding=finding)
+    found = judge._acquisition_time(study, asked("acquisition_time"))
+    assert (found.value, found.why, found.text, found.certain) == (*expected, "", True)

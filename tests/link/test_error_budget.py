@@ -1591,3 +1591,28 @@ def test_windows_that_just_fill_their_period_of_observation_lie_in_it():
         ValueError, match=r"PRE: its windows lie in two observation periods of 7\.001 s; space them wider"
     ):
         asked("PRE", 2.0, 7.0, observation_s=7.001)
+
+
+def test_a_spread_is_at_its_worst_away_from_zero_and_no_narrower_when_it_is_turned_round():
+    wide = {shape: Spread(shape, -2.0, 0.5) for shape in ("gaussian", "uniform")}
+    assert (wide["gaussian"].worst, wide["uniform"].worst) == (-3.5, -2.5)
+    for shape, spread in wide.items():
+        turned = spread.times(-3.0)
+        assert (turned.shape, turned.mean, turned.width) == (shape, 6.0, 1.5)
+        assert turned.worst == -3.0 * spread.worst
+
+
+@pytest.mark.parametrize("limit", [None, 1e-6, 40.0])
+def test_sizes_and_spectra_of_a_budget_are_those_of_all_axes_at_the_worst_satellite(limit):
+    """A spectrum stands with the largest size that there is, and sizes reach beyond total and limit."""
+    gains = np.array([3.0, -4.0])
+    hum_there = replace(hum(3.0)[0], size=Spread("gaussian", 0.5, 0.25), transfer=gains)
+    asked_for = {"APE": replace(APE, axes=(1,), limit_rad=limit)}
+    found = judge(stated([hum_there], asked_for), None)
+    (judged,) = found.judged
+    assert judged.size_rad[0] == 0.0
+    assert judged.size_rad[-1] == pytest.approx(1.3 * max(judged.total.quantile_rad, limit or 0.0), rel=1e-12)
+    (single,) = hum(3.0)
+    plain = judge(stated([single], {"APE": APE}), None)
+    assert found.freq_hz == pytest.approx(plain.freq_hz, rel=1e-12)
+    assert found.spectra["3.0"] == pytest.approx(1.25**2 * 25.0 * plain.spectra["3.0"], rel=1e-9)

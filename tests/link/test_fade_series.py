@@ -872,3 +872,28 @@ def test_where_no_power_makes_up_for_the_fades_they_are_those_below_what_the_cod
     assert (found.penalty_db, found.margin_left_db) == (math.inf, -math.inf)
     assert found.fades.level == pytest.approx(10.0 ** (-0.1 * margin_db), rel=1e-12)
     assert found.fades.share == pytest.approx(40 / 1024 if margin_db > 0.5 else 1.0)
+
+
+@pytest.mark.parametrize(("word", "span", "window"), [(4, 0, 4), (4, 2, 4), (4, 6, 6), (0.25, 0, 1), (0.25, 3, 3)])
+def test_a_word_sees_the_samples_of_the_longer_of_itself_and_its_interleaver(word, span, window):
+    block = Threshold("block", 0.5, round(word * BITS), 1.0)
+    assert linked(series_of(np.ones(400)), span, coded=block).window == window
+
+
+def test_a_level_without_end_is_refused_and_one_of_no_light_is_taken():
+    dark = np.r_[np.zeros(250), -np.inf, -3.0]
+    assert series_of(dark, unit="dB", normalised="as-given").power[250:].tolist() == [0.0, pytest.approx(10.0**-0.3)]
+    with pytest.raises(FadeSeriesError) as refused:
+        series_of(np.r_[dark, np.inf], unit="dB")
+    assert str(refused.value) == (
+        "series: sample 252 is inf, 1 such sample in all: a power must be a number up to 300 dB; cut out a part "
+        "without them."
+    )
+
+
+def test_a_series_that_is_too_short_is_refused_as_that_before_its_sampling_is_asked_for(tmp_path):
+    path = tmp_path / "short.csv"
+    for samples, words in ((199, "the series has 199 samples"), (200, "the file does not say how fast it was sampled")):
+        path.write_text("power\n" + "1\n" * samples)
+        with pytest.raises(FadeSeriesError, match=f"^powers: {words}"):
+            read_fade_series(path, unit="linear", normalised="mean", name="powers")

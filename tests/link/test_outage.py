@@ -599,3 +599,29 @@ def test_a_point_ahead_makes_a_bias_longer_and_lies_along_the_wider_axis_without
     found = link_performance.with_point_ahead(record(bias_urad, rms_urad), ahead_urad * URAD)
     assert found.bias_rad == pytest.approx([each * URAD for each in shifted_urad], rel=1e-12, abs=1e-18)
     assert found.rms_rad == tuple(each * URAD for each in rms_urad)
+
+
+def test_a_receiver_of_its_own_jitter_moves_about_each_axis_by_that_axis():
+    end = SimpleNamespace(error_rad=lambda margin_db: 4e-5)
+    own = SimpleNamespace(bias_rad=(1e-6, -3e-6), rms_rad=(2e-6, 5e-6), bandwidth_hz=40.0)
+    table = SimpleNamespace(coupling=SimpleNamespace(jitter=own))
+    data = SimpleNamespace(receiving=SimpleNamespace(is_random=True, end=end), table=table)
+    sent = pointing.MovingEnd(pointing.Jitter((7e-6, 0.0), (9e-6, 8e-6)), (1e-4, 3e-4), 1e-5)
+    found = link_performance._moving(data, sent, 4.0 * 20.0 / math.log(10.0))
+    assert found.jitter == pointing.Jitter((1e-6, -3e-6), (2e-6, 5e-6))
+    assert found.velocity_rms_rad_s == pytest.approx((80.0 * math.pi * 2e-6, 80.0 * math.pi * 5e-6), rel=1e-12)
+    assert found.half_angle_rad == pytest.approx(2e-5, rel=1e-12)
+
+
+@pytest.mark.parametrize(("rms", "speed", "rms_moved", "speed_moved"), [
+    ((0.0, 5e-6), (0.0, 7e-4), (5e-8, 5e-6), (7e-6, 7e-4)),
+    ((4e-6, 0.0), (3e-4, 0.0), (4e-6, 4e-8), (3e-4, 3e-6)),
+    ((4e-6, 1e-9), (3e-4, 2e-4), (4e-6, 4e-8), (3e-4, 2e-4)),
+    ((4e-6, 5e-6), (3e-4, 7e-4), (4e-6, 5e-6), (3e-4, 7e-4)),
+])  # fmt: skip
+def test_an_axis_that_stands_still_moves_by_a_hundredth_of_the_other(rms, speed, rms_moved, speed_moved):
+    end = pointing.MovingEnd(pointing.Jitter((3e-6, -2e-6), rms), speed, 1.5e-5)
+    found = end.moved
+    assert (found.jitter.bias_rad, found.half_angle_rad) == ((3e-6, -2e-6), 1.5e-5)
+    assert found.jitter.rms_rad == pytest.approx(rms_moved, rel=1e-12)
+    assert found.velocity_rms_rad_s == pytest.approx(speed_moved, rel=1e-12)

@@ -778,3 +778,32 @@ def test_each_rule_says_what_it_is_of_its_formula_and_who_authorises_it():
         ("exact", "radial distribution", "radial", "P(r < total) = P of a Gaussian about the mean, axes independent",
          "the reference for the rules; a sum of many errors (central limit theorem)"),
     ]  # fmt: skip
+
+
+def test_means_and_unlike_deviations_are_found_about_either_axis():
+    like = ErrorTerm("like", "random", 3.0, (0.0, 0.0), (1.0, 1.0))
+    across = ErrorTerm("across", "bias", 2.0, (0.0, -2.0), (0.0, 0.0))
+    along = ErrorTerm("along", "bias", 1.0, (1.0, 0.0), (0.0, 0.0))
+    assert summation.rss_caveat([like, across]) == "not authorised: across has a mean, and means add linearly"
+    many = [across, like, along]
+    assert summation.rss_caveat(many) == "not authorised: across, along have means, and means add linearly"
+    for sigma in ((1.0, 0.5), (0.5, 1.0)):
+        unlike = ErrorTerm("unlike", "random", 3.0, (0.0, 0.0), sigma)
+        said = "not authorised: the half widths are not the same number of standard deviations"
+        assert summation.rss_caveat([unlike]) == summation.rss_caveat([like, unlike]) == said
+    for mean in ((0.2, 0.0), (0.0, 0.2), (0.0, -0.2), (-0.2, 0.01)):
+        off = ErrorTerm("off", "random", 3.0, mean, (1.0, 1.0))
+        said = "does not apply: the mean is not 10 times below the standard deviation"
+        assert summation.rayleigh_caveat([off]) == said
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_shape_that_rules_about_one_axis_alone_is_named_whichever_axis_that_is(turned):
+    def of(name, sigma, gaussian):
+        return ErrorTerm(name, "random", 3.0, (0.0, 0.0), sigma[::-1] if turned else sigma, gaussian)
+
+    small, large = of("small", (0.1, 0.2), False), of("large", (0.3, 3.0), False)
+    normal = of("normal", (2.0, 1.0), True)
+    said = "approximate: large is not Gaussian and holds more than half of the variance"
+    assert summation.shape_caveat([small, normal, large]) == said
+    assert summation.shape_caveat([small, normal]) == ""

@@ -1222,3 +1222,34 @@ def test_a_symbol_of_two_slots_is_the_shortest(order):
 def test_an_order_that_is_no_power_of_two_above_one_is_refused(order):
     with pytest.raises(ValueError, match=f"PpmCounting.order is {order:g}:|modulation is {order:g}: it is a power of"):
         replace(PPM, order=order)
+
+
+@pytest.mark.parametrize("order", [2, 16, 64])
+@pytest.mark.parametrize("rates", [(1e9, 1e6, 3e4, 2e7), (3e4, 1e9, 1e6)])
+def test_rates_of_much_and_of_little_background_in_any_order_are_each_as_alone(order, rates):
+    """The counts of background in a slot go from a hundredth to hundreds, so that their tables end elsewhere."""
+    receiver = replace(NOISY_PPM, order=order)
+    alone = [float(receiver.required_power_w(rate)) for rate in rates]
+    assert_allclose(receiver.required_power_w(rates), alone, rtol=1e-9)
+    powers = np.array(alone) * np.linspace(0.5, 1.2, len(rates))
+    found = [float(receiver.bit_error_ratio_at(power, rate)) for power, rate in zip(powers, rates, strict=True)]
+    assert_allclose(receiver.bit_error_ratio_at(powers, rates), found, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rates", [(1e9, 3e9, 2.5e9), (3e9, 1e9), (0.5e9, 1e9, 3e9), ((1e9, 3e9), (2.5e9, 1e9))])
+def test_of_several_rates_the_highest_is_refused_wherever_it_stands(rates):
+    coded = replace(PIN, bandwidth_hz=4e9, code_rate=0.5)
+    with pytest.raises(RateError) as refused:
+        coded.required_power_w(rates)
+    assert str(refused.value) == (
+        "the data rate is 3 Gbit/s, which is 6 GHz of symbols or slots on the line: the receiver takes 4 GHz, so at "
+        "most 2 Gbit/s of data"
+    )
+
+
+def test_a_gap_to_capacity_is_that_of_each_rate_in_whatever_order_they_stand():
+    coded = replace(NOISY_PPM, code_gap_db=1.5, code_rate=0.5)
+    rates = np.array([[3e6, 2e7], [1e9, 1e6]])
+    found = coded.required_power_w(rates)
+    assert found.shape == rates.shape
+    assert_allclose(found.ravel(), [float(coded.required_power_w(rate)) for rate in rates.ravel()], rtol=1e-9)
