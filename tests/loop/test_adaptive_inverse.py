@@ -342,3 +342,42 @@ def test_what_cannot_learn_is_told_with_the_controllers_name_and_the_lowest_weig
     with pytest.raises(ValueError) as refused:
         fine.with_adaptation(replace(in_series(loop_of()), name="own"), loop)
     assert str(refused.value) == words
+
+
+def test_a_controller_that_learns_leaves_the_frozen_one_as_it_is():
+    loop = loop_of(axes=2)
+    frozen = in_series(loop)
+    kept = {key: getattr(frozen.system, key).copy() for key in "ABCD"} | {"L": frozen.anti_windup.copy()}
+    learning = fine.with_adaptation(frozen, loop)
+    for key in "ABCD":
+        assert np.array_equal(getattr(frozen.system, key), kept[key])
+    assert np.array_equal(frozen.anti_windup, kept["L"]) and frozen.adaptation is None
+    assert np.any(frozen.system.C[4:]) and not np.any(learning.system.C[4:6])  # the rate, which it does not need
+    again = fine.with_adaptation(frozen, loop)
+    assert all(np.array_equal(getattr(again.system, key), getattr(learning.system, key)) for key in "ABCD")
+
+
+@pytest.mark.parametrize(("least", "most", "swing"), [(-6.0, 5.0, 6.0), (-4.0, 5.0, 5.0), (-7.5, 7.0, 7.5)])
+@pytest.mark.parametrize(("noise", "count"), [(3e-7, 0.0), (0.0, 6e-7), (4e-7, 12e-7)])
+def test_what_is_learnt_by_knows_the_farther_end_of_the_drive_and_noise_and_counts_of_the_gauge(
+    least, most, swing, noise, count
+):
+    loop = loop_of()
+    loop = replace(
+        loop,
+        drive=replace(loop.drive, minimum_v=least, maximum_v=most),
+        gauge=replace(loop.gauge, noise_rad=noise, resolution_rad=count),
+    )
+    learnt = fine.with_adaptation(in_series(loop), loop).adaptation
+    assert learnt.swing_v == swing
+    assert learnt.noise_rad == pytest.approx(np.sqrt(noise**2 + count**2 / 12.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyError])
+def test_what_is_no_reason_against_an_inverse_is_not_told_as_one(monkeypatch, error):
+    def fails(self):
+        raise error("broken")
+
+    monkeypatch.setattr(PrandtlIshlinskii, "inverted", fails)
+    with pytest.raises(error, match="broken"):
+        adaptive.cannot_learn(PLAYS)

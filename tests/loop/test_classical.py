@@ -21,7 +21,7 @@ from microrad.loop.control.classical import (
     RESONANT_DAMPING,
     peak_family,
 )
-from microrad.loop.control.problem import DesignPlant
+from microrad.loop.control.problem import DesignPlant, Parameter
 
 PERIOD = 2e-4
 GAIN = 0.089e-3
@@ -684,3 +684,47 @@ def test_a_value_too_many_or_without_an_end_is_refused(family, plant, values):
         spoilt[-1] = value
         with pytest.raises(ValueError, match=rf"the {family.parameters(plant)[-1].name} is {value:g}; give a "):
             family.build(plant, spoilt)
+
+
+@pytest.mark.parametrize("resonance", [None, (300.0, 0.4), (900.0, 0.05)])
+def test_the_corner_and_the_resonances_of_a_plant_are_the_same_whichever_way_it_turns(resonance):
+    one, other = (axis_plant(gain=gain, amplifier_hz=400.0, resonance=resonance) for gain in (3e-5, -3e-5))
+    assert classical.corner_hz(other) == pytest.approx(classical.corner_hz(one), rel=1e-9)
+    assert classical.corner_hz(one) < 0.25 / one.period_s
+    for a, b in zip(classical.resonances(one), classical.resonances(other), strict=True):
+        assert (a.freq_hz, a.damping, a.prominence) == pytest.approx((b.freq_hz, b.damping, b.prominence), rel=1e-6)
+        assert b.prominence > 0.0
+
+
+def test_an_observer_undoes_the_most_prominent_of_several_resonances(monkeypatch):
+    plant = axis_plant()
+    several = tuple(classical.Resonance(*each) for each in ((700.0, 0.02, 9.0), (310.0, 0.05, 4.0), (90.0, 0.2, 1.5)))
+    monkeypatch.setattr(classical, "resonances", lambda given: several)
+    found = classical.observer_filter(plant, 200.0, 5e3, 0.8)
+    monkeypatch.setattr(classical, "resonances", lambda given: ())
+    plain = classical.observer_filter(plant, 200.0, 5e3, 0.8)
+    freq = np.array([50.0, 90.0, 310.0, 700.0, 1500.0])
+    notch = filters.notch(700.0, 0.02 / classical.INVERSE_DAMPING, 2 * classical.INVERSE_DAMPING, plant.period_s)
+    answers = (lti.frequency_response(each, freq, plant.period_s)[:, 0, 0] for each in (found, plain, notch))
+    whole, without, undone = answers
+    assert_allclose(whole, without * undone, rtol=1e-9)
+
+
+def test_a_value_out_of_place_is_told_with_its_bounds_and_a_unit_where_it_has_one():
+    parameters = (
+        Parameter("filter frequency", "Hz", 2.5, 75.0),
+        Parameter("depth", "", 0.01, 3.0),
+        Parameter("feedback", "", -0.9, 0.9, log=False),
+    )
+    said = []
+    for values in ([0.0, 1.0, 0.0], [5.0, -1.0, 0.0], [5.0, 1.0, np.inf], [5.0, 1.0]):
+        with pytest.raises(ValueError) as refused:
+            classical._checked("own", parameters, np.array(values))
+        said.append(str(refused.value))
+    assert said == [
+        "own: the filter frequency is 0; give a number above 0, for this plant between 2.5 and 75 Hz",
+        "own: the depth is -1; give a number above 0, for this plant between 0.01 and 3",
+        "own: the feedback is inf; give a finite number, for this plant between -0.9 and 0.9",
+        "own takes 3 values, not 2: filter frequency (Hz), depth, feedback",
+    ]
+    assert classical._checked("own", parameters, np.array([[90.0], [1e-4], [-5.0]])) == [90.0, 1e-4, -5.0]

@@ -15,7 +15,7 @@ from loops import IDEAL_DRIVE
 from microrad.core import lti
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
-from microrad.loop.control import Drive, Gains, Inverse, Timing
+from microrad.loop.control import Drive, Gains, Inverse, Timing, sampled
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, Creep, PrandtlIshlinskii
@@ -493,3 +493,32 @@ def test_a_loop_without_states_has_no_pole_and_a_slow_one_its_largest():
     A, B = np.diag([0.5, -0.9]), np.array([[1.0], [0.0]])
     assert control.slowest_pole(lti.StateSpace(A, B, np.array([[0.25, 0.0]]), np.zeros((1, 1)))) == pytest.approx(0.9)
     assert control.slowest_pole(lti.StateSpace(A, B, np.array([[-0.75, 0.0]]), np.zeros((1, 1)))) == pytest.approx(1.25)
+
+
+@pytest.mark.parametrize(("steps", "late"), [(13, 28), (29, 7), (15, 31), (8, 0)])
+def test_a_ratio_just_below_a_whole_number_of_plant_steps_is_that_number(steps, late):
+    step = 1e-5
+    clock = SimpleNamespace(rate_hz=1.0 / (steps * 1e-5), plant_step_s=step, delay_s=float(f"{late}e-5"))
+    timing = control.timing_from_mission(clock)
+    assert (timing.steps_per_sample, timing.delay_steps) == (steps, late)
+    assert_allclose(timing.period_s, steps * step, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unstable", "share"), [([(0.5, 2.0)], 0.25), ([(0.5, 2.0), (0.2, 0.3)], 0.2), ([(0.0, 2.0)], 0.0)]
+)
+def test_gains_are_advised_that_are_stable_with_themselves_and_with_twice_as_much(monkeypatch, unstable, share):
+    """Gains of these open ranges make the loop unstable; what is advised is half of the largest that does."""
+
+    def slowest(loop):
+        gain = abs(loop.D[0, 0])
+        return 1.5 if any(low < gain < high for low, high in unstable) else 0.5
+
+    one = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.ones((1, 1)))
+    monkeypatch.setattr(sampled, "slowest_pole", slowest)
+    said = sampled._advice(one, one)
+    if not share:
+        assert said == ""
+    else:
+        told = re.fullmatch(r" \(with all of them at (\S+) of what they are it has 6 dB of gain margin\)", said)
+        assert 0.94 * share < float(told[1]) <= 1.01 * share

@@ -1205,3 +1205,61 @@ def test_an_inverse_stands_in_series_where_the_name_says_so_and_learns_where_it_
     inverse = ("inverse of mirror", 70.0) if asked else ()
     assert made == (name, here.loop, "axis", *inverse, *([here.loop] if "learns" in asked else []))
     assert told == asked
+
+
+@pytest.mark.parametrize(("delay_s", "steps"), [(2.8e-4, 7), (5.2e-4, 13), (6e-4, 15), (1.12e-3, 28)])
+def test_a_delay_just_below_a_whole_number_of_plant_steps_is_that_number(file, delay_s, steps):
+    f = file.mission.fine_pointing.model_copy(update={"delay_s": delay_s})
+    assert delay_s / f.plant_step_s < steps
+    found = scene_of(replace(file, mission=file.mission.model_copy(update={"fine_pointing": f})))
+    assert found.loop.timing == found.axis.timing == control.Timing(2e-4, 5, steps)
+
+
+@pytest.mark.parametrize(("low", "high", "swing"), [(-4.0, 7.0, 4.0), (-9.0, 5.0, 5.0), (-6.0, 6.0, 6.0)])
+@pytest.mark.parametrize("gain", [-4e-5, 4e-5])
+def test_a_stroke_is_that_of_the_nearer_end_of_the_drive_whichever_way_the_mirror_turns(file, gain, low, high, swing):
+    m = file.mission
+    plays = hysteresis.PrandtlIshlinskii((0.0, 0.5), (0.75 * gain, 0.25 * gain))
+    for travel, usable in ((1.0, 2.0 * 4e-5 * swing), (1e-4, 1e-4)):
+        of = SimpleNamespace(
+            table=SimpleNamespace(travel_rad=travel),
+            drive_range_v=(low, high),
+            own={Variant.GIVEN: SimpleNamespace(model=plays)},
+        )
+        chain = scenario.optics(m.fine_pointing, m.conventions.mirror_angle)
+        chain = replace(chain, angle=m.fine_pointing.geometry.travel_angle)
+        found = scenario.stroke(m.fine_pointing, of, chain, m.pointing, file.sources, True)
+        assert [each.usable_travel_rad for each in found] == pytest.approx([usable] * 2, rel=1e-12)
+
+
+def test_a_mirror_that_turns_the_other_way_has_an_axis_of_the_same_gain_with_its_sign(file):
+    given = file.mission.mirror
+    other = given.bouc_wen.model_copy(
+        update={"d1_rad_v": -given.bouc_wen.d1_rad_v, "epsilon_rad_v": -given.bouc_wen.epsilon_rad_v}
+    )
+    turned = file.mission.model_copy(update={"mirror": given.model_copy(update={"bouc_wen": other})})
+    one, back = scene_of(file), scene_of(replace(file, mission=turned))
+    assert_allclose(back.axis.optics, one.axis.optics, rtol=1e-9)
+    assert back.axis.optics[0, 0] > 0.0
+    assert_allclose(design_plant(back.axis).gain_rad_v, design_plant(one.axis).gain_rad_v, rtol=1e-9)
+
+
+def test_no_light_at_all_is_no_missing_light(file):
+    f = file.mission.fine_pointing
+    cells = QuadCellTable.model_construct(
+        responsivity_a_w=0.8, background_power_w=2e-10, dark_current_a=3e-9, thermal_noise_a_sqrt_hz=4e-14
+    )
+    sensed = f.optical_sensor.model_copy(update={"noise_rad": None, "quad_cell": cells})
+    table = f.model_copy(update={"optical_sensor": sensed})
+    with pytest.raises(ValueError, match="the signal-to-noise ratio is 0, and a quad cell without light has no angle"):
+        scenario.optical_sensor(table, 0.0, 1.31e-6, 0.07)
+
+
+def test_all_parts_can_be_left_out_at_once_and_an_unknown_one_is_told_with_all_there_are(scene):
+    loop = scene.loop
+    bare = parts.without(loop, *parts.SWITCHES, *(each.name for each in loop.disturbances[0]))
+    assert (bare.disturbances, bare.unknown, bare.references) == (((), ()), (), (NO_REFERENCE, NO_REFERENCE))
+    with pytest.raises(ValueError) as refused:
+        parts.without(loop, parts.LIMITS, "wind")
+    known = sorted(each.name for each in loop.disturbances[0])
+    assert str(refused.value) == f"the loop has no part 'wind'; it has {', '.join([*parts.SWITCHES, *known])}"

@@ -1088,3 +1088,38 @@ def test_a_whole_that_is_unstable_has_no_margins(monkeypatch):
     assert found == whole.WholeMargins(0.0, control.MultiloopMargin(0.0, 0.0), 0.0)
     monkeypatch.setattr(designs, "whole_margins", lambda *given: given)
     assert designs._margins("plant", "controller") == ("plant", "controller")
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyError, TypeError])
+def test_what_is_no_refusal_of_a_design_of_several_axes_is_not_taken_for_one(monkeypatch, error):
+    def fails(*given):
+        raise error("broken")
+
+    family = SimpleNamespace(name="own", base=None)
+    monkeypatch.setattr(designs, "_tuned", fails)
+    one = SimpleNamespace(table=SimpleNamespace(modulus_margin=0.5))
+    with pytest.raises(error, match="broken"):
+        designs._designed(one, family, ["plant"], None)
+    monkeypatch.setattr(designs, "_designed", fails)
+    with pytest.raises(error, match="broken"):
+        designs._designed_in_turn("scene", [family], "plants")
+    monkeypatch.setattr(designs, "whole_margins", fails)
+    with pytest.raises(error, match="broken"):
+        designs._margins("plant", "controller")
+
+
+@pytest.mark.parametrize(("slew", "rates", "least"), [
+    ("3 V/ms", (2e4, 1e4, 5e4), 3e3), ("1 V/us", (7e5, 9e5, 8e5), 7e5), ("1 V/us", (9e6, 8e6, 7e6), 1e6),
+    ("40 V/ms", (9e4, 8e4, 3e4), 3e4),
+])  # fmt: skip
+def test_drives_are_as_fast_as_the_amplifier_and_each_actuator_allow(slew, rates, least):
+    plain = three_actuators()
+    of = tuple(replace(each, rate_limit_v_s=rate) for each, rate in zip(plain.actuators, rates, strict=True))
+    scene = scene_of(replace(plain, actuators=of), ('slew = "1 V/us"', f'slew = "{slew}"'))
+    assert scene.loop.drive.slew_v_s == pytest.approx(least, rel=1e-12)
+
+
+@pytest.mark.parametrize(("delay", "steps"), [("280 us", 7), ("520 us", 13), ("600 us", 15)])
+def test_a_delay_of_a_mirror_of_several_axes_is_rounded_to_whole_plant_steps(delay, steps):
+    scene = scene_of(two_axes(), ('delay = "200 us"', f'delay = "{delay}"'))
+    assert (scene.loop.timing.steps_per_sample, scene.loop.timing.delay_steps) == (5, steps)

@@ -126,3 +126,18 @@ def test_a_plant_along_directions_that_are_not_at_right_angles_is_its_own_turned
     assert_allclose(lti.frequency_response(made.system, at, 1e-3)[0], M @ there @ back, rtol=1e-10)
     assert directions.along(plant, directions.ALONG_AXES) is plant
     assert directions.on_axes(made, directions.ALONG_AXES) is made
+
+
+def test_turning_a_plant_and_a_controller_leaves_them_as_they_are():
+    plant = skewed(0.3, -1.2)
+    one = lti.StateSpace(np.diag([0.5, 0.2]), np.eye(2), np.array([[1.0, 2.0], [3.0, 4.0]]), 5.0 * np.eye(2))
+    controller = WholeController("own", one, np.array([[7.0, 8.0], [9.0, 1.0]]))
+    kept = {key: (getattr(plant.system, key).copy(), getattr(one, key).copy()) for key in "ABCD"}
+    first, second = (directions.along(plant, (0.3, -1.2)) for _ in range(2))
+    turned, again = (directions.on_axes(controller, (0.3, -1.2)) for _ in range(2))
+    for key, (of_plant, of_one) in kept.items():
+        assert np.array_equal(getattr(plant.system, key), of_plant)
+        assert np.array_equal(getattr(one, key), of_one)
+        assert np.array_equal(getattr(first.system, key), getattr(second.system, key))
+        assert np.array_equal(getattr(turned.system, key), getattr(again.system, key))
+    assert controller.anti_windup.tolist() == [[7.0, 8.0], [9.0, 1.0]]

@@ -1722,3 +1722,83 @@ def test_a_matrix_of_a_shaping_filter_that_is_too_small_or_too_large_is_refused(
     with pytest.raises(ValueError) as refused:
         replace(FILTER, **{key: -np.ones(shape)})
     assert "A {A}, B {B} and C {C} do not fit together; give A (n, n)".format(**shapes) in str(refused.value)
+
+
+@pytest.mark.parametrize("error", [MemoryError, RuntimeError, KeyError])
+def test_what_is_no_trouble_with_a_table_or_a_spectrum_is_not_told_as_such(tmp_path, monkeypatch, error):
+    def fails(*given):
+        raise error("broken")
+
+    path = write(tmp_path, "Hz,urad^2/Hz\n1,4\n2,3\n5,1\n")
+    with monkeypatch.context() as patch:
+        patch.setattr(tables, "read_bytes", fails)
+        with pytest.raises(error, match="broken"):
+            read_table(path)
+    several = combine(olympus(), resonance())
+    with monkeypatch.context() as patch:
+        patch.setattr(lti, "modal_from_roots", fails)
+        with pytest.raises(error, match="broken"):
+            one_input(several)
+    if error is not RuntimeError:  # what the solver says where it does not settle
+        samples = terms.table_samples(np.array([1.0, 2.0, 4.0]), np.array([3.0, 2.0, 1.0]))
+        monkeypatch.setattr("scipy.optimize.nnls", fails)
+        with pytest.raises(error, match="broken"):
+            terms._powers(samples, [Term("first-order", 1.0, 1.0)])
+
+
+def test_bytes_at_hand_are_read_in_place_of_the_file_even_none(tmp_path):
+    path = write(tmp_path, "Hz,urad^2/Hz\n1,4\n2,3\n5,1\n")
+    assert read_table(path, data=b"Hz,nrad^2/Hz\n1,4\n2,3\n8,1\n")[0].tolist() == [1.0, 2.0, 8.0]
+    with pytest.raises(ValueError, match=r"spectrum\.csv: 0 frequencies and 0 densities"):
+        read_table(path, "urad^2/Hz", b"")
+    with pytest.raises(ValueError, match=r"nowhere\.csv: no unit of the density is named"):
+        read_table(tmp_path / "nowhere.csv", data=b"")
+    assert read_table(tmp_path / "nowhere.csv", data=b"Hz,nrad^2/Hz\n1,4\n2,3\n8,1\n")[0].size == 3
+
+
+def test_an_empty_word_is_no_unit(tmp_path):
+    with pytest.raises(ValueError, match=r'spectrum\.csv: "" is no unit of a density; say one of rad\^2/Hz, mrad'):
+        read_table(write(tmp_path, "Hz,urad^2/Hz\n1,4\n2,3\n5,1\n"), "")
+
+
+@pytest.mark.parametrize("first", ["+1.5 3", "-0 3", ".5 3", "0.5 3"])
+def test_a_first_row_may_begin_with_a_sign_or_a_point(first):
+    freq, density = read_table("rows", data=f"Hz urad^2/Hz\n{first}\n2 7\n3 8\n4 9\n".encode())
+    assert freq.tolist() == [float(first.split()[0]), 2.0, 3.0, 4.0]
+    assert_allclose(density, [3e-12, 7e-12, 8e-12, 9e-12], rtol=1e-12)
+
+
+def test_a_heading_is_read_line_by_line():
+    text = "Hz urad^2/Hz\nsecond column is one-sided, k\nHz in the first\n1 4\n2 3\n5 1\n"
+    assert read_table("rows", data=text.encode())[0].tolist() == [1.0, 2.0, 5.0]
+
+
+def test_what_a_fit_is_given_is_left_as_it_is():
+    edges, rms = np.array([0.0, 1.0, 10.0]), np.array([3e-6, 2e-6])
+    fit_bands(edges, rms, convention="radial")
+    assert (edges.tolist(), rms.tolist()) == ([0.0, 1.0, 10.0], [3e-6, 2e-6])
+    freq = np.append(0.0, np.geomspace(0.1, 100.0, 30))
+    density = 1e-12 / (1.0 + freq**2)
+    kept = freq.copy(), density.copy()
+    fit_table(freq, density, convention="radial")
+    assert np.array_equal(freq, kept[0]) and np.array_equal(density, kept[1])
+
+
+def test_a_start_leaves_the_numbers_that_it_is_drawn_from_as_they_are():
+    discrete = discretise(mixture(), STEP_S)
+    rng = philox(8)
+    gaussians, phases = rng.standard_normal((discrete.Ad.shape[0], 3)), rng.random((2, 3))
+    kept = gaussians.copy(), phases.copy(), discrete.initial.copy()
+    first = initial_state(discrete, gaussians, phases)
+    assert np.array_equal(first, initial_state(discrete, gaussians, phases))
+    assert np.array_equal(gaussians, kept[0]) and np.array_equal(phases, kept[1])
+    assert np.array_equal(discrete.initial, kept[2])
+
+
+def test_terms_that_are_fitted_leave_the_start_of_the_search_as_it_is():
+    start, bounds = np.array([0.5, 5.0]), np.array([[0.0, 0.0], [2.0, 2.0]])
+    kept = start.copy(), bounds.copy()
+    aim = np.array([1.25, 0.75])
+    found = terms._least_squares(lambda x: x - aim, lambda x: np.eye(2), start, bounds)
+    assert_allclose(found, aim, rtol=1e-6)
+    assert np.array_equal(start, kept[0]) and np.array_equal(bounds, kept[1])

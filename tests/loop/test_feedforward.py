@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 import oracles
 from hysteretic_springs import FAMILIES, RAD_V, driven, idle, on_springs, quiet, sines, with_errors
+from learning_loops import in_series, loop_of
 from microrad.core import lti
 from microrad.loop import control, coupled_study
 from microrad.loop.control import AxisController
@@ -354,3 +355,12 @@ def test_a_refused_feedforward_is_told_with_its_own_name_the_feedbacks_and_the_m
             "part, where it has an inverse; use with_inverse",
         }[name]
     )
+
+
+def test_a_loop_takes_targets_of_an_inverse_and_none_where_hysteresis_is_run_ahead():
+    given = scene(next(iter(FAMILIES)))
+    ahead, alone = (arrays(given.loop, each, 1) for each in (forward(given), integral(given)))
+    assert (ahead.feedforward, alone.feedforward) == (False, False)
+    assert (ahead.forward.drives.shape[1], alone.forward.drives.shape[1]) == (len(given.loop.mirror.bank), 0)
+    plays = loop_of()
+    assert arrays(plays, in_series(plays), 1).feedforward

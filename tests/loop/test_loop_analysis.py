@@ -766,3 +766,36 @@ def test_a_loop_is_real_at_half_the_rate_and_nowhere_below():
     cycles = np.array([0.1, 0.5 - 1e-8, 0.5 * (1.0 - 1e-10), 0.5])
     found = analysis.real_at_half_the_rate(L, cycles)
     assert found.tolist() == [[1.0 + 2.0j, -3.0 + 4.0j, 5.0, 7.0]]
+
+
+@pytest.mark.parametrize("output", [RESIDUAL, OPTICAL, GAUGE])
+@pytest.mark.parametrize("gain", [-2e-4, 2e-4])
+def test_no_output_of_a_plant_answers_the_command_of_its_own_sample(output, gain):
+    plant = pure_gain(PERIOD)
+    D = plant.system.D.copy()
+    D[output, 0] = gain
+    with pytest.raises(ValueError, match="answers the command of its own sample"):
+        analysis.refuse_misfit(replace(plant, system=replace(plant.system, D=D)), integrator(1.0))
+
+
+@pytest.mark.parametrize(
+    ("rest", "up"),
+    [(-5e-4 + 1e-4j, math.inf), (-5e-4 + 1e-7j, 2e3), (-0.25 + 2e-4j, 4.0), (-0.25 + 3e-4j, math.inf)],
+)
+def test_a_loop_is_real_at_rest_where_its_phase_is_that_of_feedback_to_a_thousandth(rest, up):
+    """Above rest the loop turns away from the real axis and ends on its positive side."""
+    freq = np.array([1e-3, 1.0, 10.0, 100.0])
+    L = np.array([rest, 0.1 + 0.1j, 0.1 + 0.1j, 0.05 + 0j])
+    found = analysis._gain_margins(lambda f: np.interp(f, freq, L.real) + 1j * np.interp(f, freq, L.imag), freq, L)
+    assert found == (pytest.approx(up, rel=1e-12), 0.0)
+
+
+@pytest.mark.parametrize(("optical", "gauge"), [(True, False), (False, True), (True, True)])
+def test_a_plant_that_is_reduced_to_what_moves_keeps_which_sensors_it_has(optical, gauge):
+    plant = replace(axis_plant(gain=-3e-5, delay=2, lines=((40.0, 1e-6),)), has_optical=optical, has_gauge=gauge)
+    kept = {key: getattr(plant.system, key).copy() for key in "ABCD"}
+    found = analysis.moved(plant)
+    assert (found.has_optical, found.has_gauge, found.disturbances) == (optical, gauge, 0)
+    assert (found.period_s, found.gain_rad_v) == (plant.period_s, -3e-5)
+    assert found.system.B.shape == (found.system.order, 1) and found.system.order < plant.system.order
+    assert all(np.array_equal(getattr(plant.system, key), kept[key]) for key in "ABCD")

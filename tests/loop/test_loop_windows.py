@@ -218,3 +218,16 @@ def test_reproducibility_of_a_mean_is_told_before_and_behind_the_loop_without_a_
     assert math.isnan(found.rational)
     assert found.before["wheel"] == pytest.approx(windowed_rms(LINES, found.index), rel=1e-9)
     assert found.left.keys() == {"vibration", "wheel", "optical sensor noise", "gauge noise"}
+
+
+@pytest.mark.parametrize("at_samples", [False, True])
+@pytest.mark.parametrize(("known", "pointed"), [("AKE", "APE"), ("MKE", "MPE"), ("RKE", "RPE")])
+def test_what_is_known_counts_in_a_loop_as_what_is_pointed(known, pointed, at_samples):
+    each, times = closed(), () if known == "AKE" else (0.05,)
+    kinds = [ErrorIndex(kind, *times) for kind in (known, pointed)]
+    one, other = (windows.windowed_in_all(each, index, at_samples=at_samples) for index in kinds)
+    assert one.tolist() == other.tolist()
+    one, other = (variances(windowed(each, index)) for index in kinds)
+    assert one == other
+    (of_known,), (of_pointed,) = (windows.windowed_errors(each, [index]) for index in kinds)
+    assert replace(of_known, index=kinds[1]) == of_pointed

@@ -532,3 +532,21 @@ def test_what_is_used_in_the_end_has_coarser_numbers_than_what_a_search_looks_at
 def test_each_weight_has_to_be_above_nothing(change, said):
     with pytest.raises(ValueError, match=f"^LQG: a command weight {said}have no optimum: both have to be above 0"):
         lqg.lqg_controller(FULL, replace(PLAIN, **change))
+
+
+def test_equations_leave_their_matrices_as_they_are():
+    rng = np.random.default_rng(11)
+    A, B, N = 0.4 * rng.standard_normal((4, 4)), rng.standard_normal((4, 2)), rng.standard_normal((4, 4))
+    Q, R = N @ N.T, np.diag([2.0, 3.0])
+    kept = [each.copy() for each in (A, B, Q, R)]
+    first = lqg.riccati(A, B, Q, R, "none")
+    assert_allclose(first, solve_discrete_are(A, B, Q, R), rtol=1e-9)
+    assert np.array_equal(first, lqg.riccati(A, B, Q, R, "none"))
+    stable = A / (1.1 * np.max(np.abs(np.linalg.eigvals(A))))
+    kept.append(stable.copy())
+    found = lqg._gramian(stable, Q)
+    assert_allclose(found, solve_discrete_lyapunov(stable.T, Q), rtol=1e-9)
+    assert np.array_equal(found, lqg._gramian(stable, Q))
+    assert_allclose(lqg.stein(stable, 0.5 * stable, Q), lqg.stein(stable, 0.5 * stable, Q), rtol=0.0)
+    for each, before in zip((A, B, Q, R, stable), kept, strict=True):
+        assert np.array_equal(each, before)

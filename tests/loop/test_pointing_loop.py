@@ -1862,3 +1862,25 @@ def test_a_slow_state_keeps_its_time_constant_beside_a_line_that_is_turned_exact
     assert_allclose(found.coupling[4:6], exp(-3.0 * 5e-5) * np.sin(2e-3) * np.array([1.0, -1.0]), rtol=1e-8)
     assert_array_equal(found.coupling[4:6], lti.to_bits(found.coupling[4:6], lti.EXACT_BITS))
     assert not found.coupling[[0, 1, 6, 7]].any()
+
+
+@pytest.mark.parametrize(("cached", "told"), [(True, 0), (False, 1)])
+def test_it_is_told_that_kernels_are_compiled_where_they_are(monkeypatch, cached, told):
+    heard = []
+    monkeypatch.setattr(kernels, "is_compiled", lambda loop: cached)
+    monkeypatch.setattr(ensemble, "in_background", lambda job: lambda: None)
+    monkeypatch.setattr(ensemble.compiling, "begins", lambda: heard.append("begins"))
+    ensemble.compile_in_background(coupled)
+    assert len(heard) == told
+
+
+def test_looking_at_a_loop_by_frequency_leaves_it_as_it_is():
+    closed = linear.close(*with_pi(scenario(2)))
+    freq, kept = np.array([3.0, 40.0, 900.0]), [each.copy() for each in closed.samples]
+    first = linear.loop_response(closed, freq)
+    spectrum = linear.residual_spectrum(closed, freq)
+    assert_array_equal(linear.loop_response(closed, freq), first)
+    assert_array_equal(linear.residual_spectrum(closed, freq), spectrum)
+    assert_allclose(linear.sensitivity(closed, freq) @ (np.eye(2) + first), np.tile(np.eye(2), (3, 1, 1)), atol=1e-12)
+    for each, before in zip(closed.samples, kept, strict=True):
+        assert_array_equal(each, before)

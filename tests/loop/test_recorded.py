@@ -938,3 +938,22 @@ def test_a_recording_is_played_neither_ten_thousand_times_faster_nor_slower(step
     motion = recorded_motion(MOVING, 1e-3, "tracker")
     with pytest.raises(ValueError, match=f"0.001 s apart, are not played every {step_s:g} s: rates may differ 10000"):
         resampled(motion, step_s)
+
+
+@pytest.mark.parametrize("level", [-3e-6, 3e-6, 0.0])
+@pytest.mark.parametrize("ripple", [0.0, 1e-13])
+def test_a_motion_that_stands_still_is_refused_on_either_side_of_rest(level, ripple):
+    samples = level * (1.0 + ripple * np.resize([1.0, -1.0], 300))
+    with pytest.raises(ValueError, match=rf'^"own" stands still at {level:g} rad; name a channel that moves$'):
+        recorded_motion(samples, 1e-3, "own")
+    moves = level * (1.0 + 1e-11 * np.resize([1.0, -1.0], 300)) + (1e-20 * np.arange(300) if level == 0.0 else 0.0)
+    assert recorded_motion(moves, 1e-3, "own").name == "own"
+
+
+def test_looking_for_lines_leaves_the_motion_as_it_is():
+    time = 1e-3 * np.arange(4000)
+    rest = np.sin(2.0 * np.pi * 80.0 * time) + 0.05 * np.random.default_rng(2).standard_normal(time.size)
+    kept = rest.copy()
+    lines, left = find_lines(rest, 1e-3)
+    assert len(lines) == 1 and np.array_equal(rest, kept)
+    assert np.std(left) < 0.1 * np.std(rest)

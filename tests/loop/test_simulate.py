@@ -540,3 +540,31 @@ def test_a_loop_of_three_actuators_and_two_axes_starts_at_rest_with_room_for_bot
               "counts": (3, 2), "inverse_clamped": (loop.inverse_bouc_wen.shape[0] + 3,)}  # fmt: skip
     assert {name: getattr(state, name).shape for name in shapes} == shapes
     assert (loop.sensor_resolution.shape, loop.actuator.shape, loop.allocation.shape) == ((2,), (3, 5), (3, 2))
+
+
+@pytest.mark.parametrize("drive", [[[0.0, 1.0], [2.0, 1.0], [-5.0, 4.0]], [[0.0, 1.0], [5.0, 1.0], [6.0, -6.0]]])
+def test_the_fastest_drive_is_one_that_rises_or_falls(drive):
+    trace = replace(a_trace([1.0, 2.0, 4.0]), drive_v=np.array(drive))
+    assert tracking.Run("given", "PID", 3.0, trace).fastest_drive_v_s == pytest.approx(7.0 / 0.02, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("direct", "bouc_wen", "drives"),
+    [((0.0, 0.0), (), False), ((0.0, 3.0), (), True), ((3.0, 0.0), (), True), ((0.0, 0.0), (PRINTED,), True)],
+)
+def test_a_loop_is_fed_forward_where_any_of_its_actuators_is(mission, direct, bouc_wen, drives):
+    of = mirror.combine(papers_mirror(PRINTED), papers_mirror(STRAIGHT))
+    controller = lti.StateSpace(np.array([[0.5]]), np.ones((1, 2)), np.ones((2, 1)), np.eye(2))
+    setup = simulate.Setup(control.Drive(-3.0, 5.0, 700.0, 250.0, 2e-3, 7e-9), control.Timing(2e-4, 4, 3), controller)
+    inverse = control.Inverse(direct, bouc_wen, (1,) * len(bouc_wen))
+    assert simulate.assemble(of, setup, inverse).feedforward is drives
+
+
+@pytest.mark.parametrize(("states", "unrolled"), [(0, True), (1, True), (2, True), (3, False)])
+def test_loops_over_a_controller_of_many_states_are_not_unrolled(states, unrolled):
+    of = papers_mirror(PRINTED)
+    controller = lti.StateSpace(0.5 * np.eye(states), np.ones((states, 1)), np.ones((1, states)), np.ones((1, 1)))
+    setup = simulate.Setup(control.Drive(-3.0, 5.0, 700.0, 250.0, 2e-3, 7e-9), control.Timing(2e-4, 4, 3), controller)
+    loop = simulate.assemble(of, setup, control.no_feedforward(of))
+    assert [isinstance(each, tuple) for each in (loop.actuators, loop.axes, loop.states)] == [unrolled] * 3
+    assert len(loop.states) == states

@@ -332,3 +332,24 @@ def test_runs_are_shared_out_to_the_threads_that_are_asked_for(monkeypatch, thre
     simulated(PLAIN, INDICES[:1], span, 65, threads=threads)
     ensemble.simulate(PLAIN.parts, PLAIN.assembled(TRACKING), span, 130, threads=threads)
     assert asked == [(2, threads), (3, threads)]
+
+
+@pytest.mark.parametrize(("known", "pointed"), [("AKE", "APE"), ("MKE", "MPE"), ("RKE", "RPE")])
+def test_what_is_known_counts_in_runs_as_what_is_pointed(known, pointed):
+    error = np.random.default_rng(9).standard_normal((60, 2, 3))
+    window = 0 if known == "AKE" else 7
+    times = () if known == "AKE" else (0.007,)
+    found = []
+    for kind in (known, pointed):
+        tally = simulation._Squares(ErrorIndex(kind, *times), window, 0)
+        for at in (0, 25, 50):
+            tally.add(at, error[at : at + 25])
+        found.append(tally.mean)
+    assert found[0].tolist() == found[1].tolist()
+    windows = error[:56].reshape(8, 7, 2, 3)
+    by_hand = {
+        "APE": np.mean(error**2, axis=0),
+        "MPE": np.mean(np.mean(windows, axis=1) ** 2, axis=0),
+        "RPE": np.mean(np.var(windows, axis=1), axis=0),
+    }
+    assert_allclose(found[0], by_hand[pointed], rtol=1e-12)

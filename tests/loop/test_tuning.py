@@ -1157,3 +1157,59 @@ def test_a_plant_that_is_not_stationary_is_refused_whichever_way_its_pole_lies_a
         )
     poles[1] = 0.999 * pole / abs(pole)
     assert judge.Judge([replace(PLAIN, system=replace(PLAIN.system, A=np.diag(poles)))]).open_rad2 > 0.0
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyError, TypeError])
+def test_what_is_no_refusal_ends_a_search_instead_of_being_taken_for_one(monkeypatch, error):
+    def fails(*given, **named):
+        raise error("broken")
+
+    looked = fake_search({}, HALF, build=fails)
+    with pytest.raises(error, match="broken"):
+        looked.of(np.array([1.0, 2.0]))
+    assert (looked.reason, looked.count, looked.trials) == (None, 0, [])
+    monkeypatch.setattr(tuning, "tune", fails)
+    containing = SimpleNamespace(
+        family=SimpleNamespace(base=PI, extended=lambda plant, values: values), plants=[PLAIN], specification=HALF
+    )
+    with pytest.raises(error, match="broken"):
+        tuning._contained(containing, 1, 10, None)
+    with pytest.raises(error, match="broken"):
+        promises.firmer(0.4, fails, lambda designs: [])
+
+
+def test_of_a_controller_that_does_not_fit_its_plant_the_first_reason_is_kept():
+    def misfit(plant, controller):
+        if controller[0] > 2.0:
+            raise ValueError(f"{controller[0]:g} does not fit {plant}")
+
+    known = {v: judge.Verdict(0.1 * v, v, MODULI, BANDS) for v in (1.0, 2.0)}
+    looked = fake_search(known, HALF, build=lambda plant, values: tuple(values))
+    looked._scope = replace(looked._scope, misfit=misfit)
+    found = looked.of_all([np.array([v, 0.5]) for v in (1.0, 3.0, 2.0, 4.0)])
+    assert [t.verdict.pole for t in found] == near([0.1, math.inf, 0.2, math.inf])
+    assert str(looked.reason) == "3 does not fit p"
+
+
+def test_a_gentle_value_of_nothing_is_one_and_without_any_the_least_is_gentle():
+    even = partial(Parameter, unit="", log=False)
+    parameters = (
+        even("feedback", least=-3.0, most=1.0, gentle=0.0),
+        even("least", least=-3.0, most=1.0),
+        even("most", least=-3.0, most=1.0, gentle=1.0),
+    )
+    looked = fake_search({}, HALF, parameters=parameters)
+    assert looked._gentle.tolist() == near([0.75, 0.0, 1.0])
+
+
+def test_the_nearest_to_what_is_asked_for_misses_least_and_of_those_leaves_least(monkeypatch):
+    verdict = partial(judge.Verdict, mean_rad2=1.0, bandwidths_hz=BANDS)
+    known = (0.9, 1.0, -0.5), (0.9, 3.0, -0.2), (0.9, 2.0, -0.2), (1.2, 0.0, -0.1), (0.9, 9.0, -0.4)
+    trials = [
+        search.Trial(NONE[0], NONE[0], verdict(pole=pole, moduli=MODULI), cost, np.array([excess, 1.0]))
+        for pole, cost, excess in known
+    ]
+    monkeypatch.setattr(tuning, "_out_of_reach", lambda search, best: best)
+    monkeypatch.setattr(tuning, "_no_stable", lambda search: "none")
+    assert tuning._refusal(SimpleNamespace(trials=trials)) is trials[2]
+    assert tuning._refusal(SimpleNamespace(trials=trials[3:4])) == "none"

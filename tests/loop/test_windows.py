@@ -11,7 +11,7 @@ from scipy.integrate import quad, simpson
 
 from microrad.core import lti
 from microrad.loop import disturbance
-from microrad.loop.disturbance import Disturbance, SpectralLine, olympus, psd
+from microrad.loop.disturbance import Disturbance, SpectralLine, olympus, psd, recorded_lines
 from microrad.loop.disturbance.records import covariance
 from microrad.loop.disturbance.windows import (
     ErrorIndex,
@@ -552,3 +552,33 @@ def test_a_density_has_one_finite_value_above_nothing_for_each_frequency(freq_hz
 def test_a_recorded_motion_is_finite_to_its_last_sample(value):
     with pytest.raises(ValueError, match=r"a recorded motion has the shape \(4,\): give one row of finite samples"):
         recorded_rms([1.0, 2.0, 3.0, value], 0.01, ErrorIndex("APE"))
+
+
+@pytest.mark.parametrize(("known", "pointed"), [("AKE", "APE"), ("MKE", "MPE"), ("RKE", "RPE")])
+def test_what_is_known_counts_as_what_is_pointed_in_every_kind_of_motion(known, pointed):
+    """Of modes that coincide, of lines, of a table and of a recording; each kind gives another number."""
+    double = Disturbance(
+        "d", np.array([[-9.0, 5.0], [0.0, -9.0]]), np.diag([2e-6, 7e-6]), np.array([[1.0, 0.5]]), LINES.lines, "", ""
+    )
+    freq, times = np.geomspace(0.01, 50.0, 6), () if known == "AKE" else (0.2,)
+    found = []
+    for index in (ErrorIndex(known, *times), ErrorIndex(pointed, *times)):
+        kinds = [windowed_rms(motion, index) for motion in (double, LINES, MOVED)]
+        kinds += [tabulated_rms(freq, psd(RADIAL, freq), index, sided) for sided in ("one", "two")]
+        kinds += [recorded_rms(MADE, 0.01, index), rational_rms(MOVED, index)]
+        found.append([*kinds, *index.weight(freq), *index.rational_weight(freq), *np.ravel(index.cosines)])
+    assert found[0] == found[1]
+    others = {ErrorIndex(kind, *(() if kind == "APE" else (0.2,))) for kind in ("APE", "MPE", "RPE")}
+    assert len({windowed_rms(double, index) for index in others}) == 3
+
+
+@pytest.mark.parametrize("size", [640, 643, 647])
+def test_amplitudes_of_a_line_are_those_of_eight_parts_from_the_begin_on(size):
+    step, freq = 1e-2, 7.3
+    time = step * (np.arange(size) - 0.5 * (size - 1))
+    rest = np.random.default_rng(6).standard_normal(size)
+    rest[640:] = 1e6  # what is left over behind the last part
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(80) / 80.0)
+    turned = rest * np.exp(-2j * np.pi * freq * time)
+    expected = [2.0 * np.sum(turned[80 * i : 80 * (i + 1)] * window) / np.sum(window) for i in range(8)]
+    assert_allclose(recorded_lines._amplitudes(rest, time, freq), expected, rtol=1e-9)

@@ -12,12 +12,20 @@ from numpy.testing import assert_allclose
 
 import several_axes
 from campaign_files import MIRROR
+from learning_loops import loop_of
+from microrad.core import lti
 from microrad.loop import control, coupled_study, worst_case
 from microrad.loop.disturbance import Misalignment
 from microrad.loop.disturbance.windows import ErrorIndex
 from microrad.loop.pointing_loop.design import design_plant, whole_plant
 from microrad.loop.pointing_loop.linear import close, stationary
-from microrad.loop.pointing_loop.loop import assemble, assemble_whole, decoupling, nominal_axis_gain
+from microrad.loop.pointing_loop.loop import (
+    LoopController,
+    assemble,
+    assemble_whole,
+    decoupling,
+    nominal_axis_gain,
+)
 from microrad.loop.pointing_loop.windows import windowed_errors
 from microrad.loop.worst_case import APE, Extent, Simulated, Subject, batch, in_time, search
 from microrad.mirror import coupled, from_table, spread
@@ -609,3 +617,65 @@ def test_figures_of_mirrors_are_of_their_elements_gains_at_rest_or_of_slow_motio
     assert asked == [("theory", "PI", [(gain, gain), ()], (APE,), 5)]
     assert found.rms_rad.tolist() == [[3.0 * alike**0.5, 5.0 * alike**0.5]]
     assert (found.modulus.tolist(), found.pole.tolist()) == ([0.5], [0.9])
+
+
+def test_a_value_below_nothing_is_moved_up_and_down_in_its_own_standard_errors(tmp_path):
+    """Of a gain above 0 and a weight below 0 that go along with each other by half."""
+    errors = {"bouc_wen.d1": ("d1_rad_v", 0.02), "bouc_wen.epsilon": ("epsilon_rad_v", 0.05)}
+    names = str(list(errors)).replace("'", '"')
+    text = f"{MIRROR}\n[uncertainty]\nparameters = {names}\nstandard_errors = [0.02, 0.05]\ncorrelation = [0.5]\n"
+    (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
+    table = load_loop(DEFAULT, tmp_path / "mirror.toml")[0].mission.mirror
+    known = worst_case.of_table(table)
+    assert_allclose(known.rows @ known.rows.T, [[1.0, 0.5], [0.5, 1.0]], rtol=1e-9)
+    own = from_table(table).inverse[0]
+    assert own.epsilon_rad_v < 0.0 < own.d1_rad_v
+    normals = [np.array(each) for each in ((1.0, 0.0), (0.0, 1.0), (-0.7, 2.0))]
+    for each in (*known.drawn(3, 8), *map(known.moved, normals)):
+        there = each.mirror.inverse[0]
+        off = [
+            (getattr(there, name) - getattr(own, name)) / (error * abs(getattr(own, name)))
+            for name, error in errors.values()
+        ]
+        assert_allclose(each.sigmas, off, rtol=1e-6, atol=1e-9)
+    for each in normals:
+        assert_allclose(known.moved(each).sigmas, known.rows @ each, rtol=1e-9, atol=1e-12)
+
+
+def test_a_parameter_whose_error_makes_a_loop_unstable_matters_more_than_any(monkeypatch):
+    rows = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+    def moved(normals):
+        return search.Moved(tuple(normals.tolist()), rows @ normals)
+
+    def figures(mirrors, indices, threads):
+        a, b, c = np.array([each.mirror for each in mirrors]).T
+        wild = b > 0.5
+        return worst_case.Figures(
+            np.where(wild, np.inf, 5.0 + 3.0 * a + 0.1 * c)[:, None], np.where(wild, 0.0, 0.5 + 0.01 * c), 1.0 + 0.1 * b
+        )
+
+    known = SimpleNamespace(parameters=("gain", "pole", "zero"), rows=rows, moved=moved)
+    subject = SimpleNamespace(known=known, figures=figures)
+    for most, expected in ((1, [1]), (2, [0, 1])):
+        monkeypatch.setattr(search, "CLOSELY", most)
+        assert search._likely(subject, moved(np.zeros(3)), (APE,), 1) == expected
+
+
+@pytest.mark.parametrize(
+    ("used", "cuts", "readings"),
+    [((0,), ["_at_optical"], 1), ((1,), ["_at_commands"], 2), ((0, 1), ["_at_optical", "_at_commands"], 2),
+     ((0, 2), ["_at_optical"], 1), ((0, 1, 2), ["_at_optical", "_at_commands"], 2)],
+)  # fmt: skip
+@pytest.mark.parametrize("through", ["B", "D"])
+def test_a_loop_is_cut_at_the_sensors_that_its_controller_looks_at_and_not_at_its_reference(
+    used, cuts, readings, through
+):
+    """Inputs: optical error, gauge, reference; into the states alone or straight to the command."""
+    loop = loop_of()
+    B, D = np.zeros((1, 3)), np.zeros((1, 3))
+    (B if through == "B" else D)[0, list(used)] = 2.0
+    one = lti.StateSpace(np.array([[0.5]]), B, np.ones((1, 1)), D)
+    margins = batch.Margins(loop, LoopController("own", one, np.zeros((1, 1))))
+    assert [cut.__name__ for cut in margins._cuts] == cuts
+    assert margins._answers.shape[1:] == (1, readings)
