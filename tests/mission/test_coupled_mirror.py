@@ -1391,3 +1391,11 @@ def test_a_place_on_a_mirror_has_two_coordinates_no_fewer_and_no_more(place, ref
     wanted = 'x and y in the plane of the mirror: position = ["30 mm", "0 mm"]'
     assert [(each.key, each.expected) for each in found] == [("position", wanted)] * refused
     assert all(each.reason.startswith(f"has {len(place)} coordinate") for each in found)
+
+
+@pytest.mark.parametrize(("wrong", "rows", "told"), [(1, 19, 19), (1, 30, 20), (3, 6, 18), (3, 30, 21), (30, 30, 30)])
+def test_of_a_matrix_twenty_faults_are_told_and_those_that_share_a_row_with_the_last(wrong, rows, told):
+    problems = refused(MATRIX.read, [[1.0, *["a"] * wrong]] * rows)
+    assert len(problems) == told
+    assert problems[0].reason.startswith("row 1: item 2: ")
+    assert problems[-1].reason.startswith(f"row {-(-told // wrong)}: item {wrong + 1}: ")

@@ -872,3 +872,51 @@ ALL_OF_A_DAY = {
 def test_all_that_does_not_fit_in_a_table_of_a_day_is_told_in_full(what):
     problems, words = ALL_OF_A_DAY[what]
     assert told(problems()) == one_line(words)
+
+
+WHOLE_ORBITS = {
+    "circular": {"altitude_m": 5e5, "inclination_rad": 0.0, "phase_rad": 0.0, "gravity": "two-body"},
+    "keplerian": {
+        "semi_major_axis_m": 7e6, "eccentricity": 0.0, "inclination_rad": 0.0, "argument_of_perigee_rad": 0.0,
+        "mean_anomaly_rad": 0.0, "gravity": "j2",
+    },
+    "elements": {"file": "a.tle"},
+    "ephemeris": {"file": "a.oem"},
+    "geostationary": {"longitude_rad": 0.0},
+    "station": {"latitude_rad": 0.0, "longitude_rad": 0.0, "height_m": 0.0, "mask_rad": 0.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", WHOLE_ORBITS)
+def test_an_orbit_has_the_keys_of_its_kind_though_they_be_nought_and_limits_beside_them(kind):
+    given = WHOLE_ORBITS[kind]
+    planes = [{"node_rad": 0.0}, {"local_time_s": 0.0}] if kind in ("circular", "keplerian") else [{}]
+    for more in (*planes, {**planes[0], "limits": SimpleNamespace(attitude="free")}):
+        assert told(made(OrbitTable, kind=kind, **given, **more).problems()) == ""
+    held = told(made(OrbitTable, kind=kind, **given, **planes[0], limits=SimpleNamespace(attitude="nadir")).problems())
+    assert ("limits.attitude" in held) is (kind == "station")
+    named = told(made(OrbitTable, kind=kind, **given, **planes[0], object="a").problems())
+    assert (named == "") is (kind in ("elements", "ephemeris"))
+    for key in given:
+        lacking = made(OrbitTable, kind=kind, **{k: v for k, v in given.items() if k != key}, **planes[0])
+        assert len(list(lacking.problems())) == 1
+    if len(planes) == 2:
+        both = told(made(OrbitTable, kind=kind, **given, **planes[0], **planes[1]).problems())
+        assert both == "node stands beside local_time: expected one of the two removed"
+        following = given | planes[0] | {"inclination_rad": "sun-synchronous"}
+        sun = told(made(OrbitTable, kind=kind, **following).problems())
+        assert sun.partition(",")[0] == ('gravity is "two-body"' if kind == "circular" else "")
+
+
+def test_a_station_of_our_own_stands_beside_no_way_from_a_satellite_that_the_mission_has():
+    for operations_, constellation, keys in (
+        (None, None, []),
+        (None, 0, ["constellation"]),
+        (SimpleNamespace(downlink=None, optical=None), None, []),
+        (SimpleNamespace(downlink=None, optical=0), None, ["operations.optical"]),
+        (SimpleNamespace(downlink=0, optical=None), 0, ["operations.downlink", "constellation"]),
+    ):
+        found = _both_fly(SimpleNamespace(station="leo"), operations_, constellation)
+        assert [each.key for each in found] == keys
+        assert not list(_both_fly(SimpleNamespace(station=""), operations_, constellation))
+        assert not list(_both_fly(None, operations_, constellation))

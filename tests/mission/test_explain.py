@@ -200,3 +200,56 @@ def test_of_a_long_name_its_begin_is_held_against_the_keys():
     ) as told:
         explained(f"{name}{'x' * 60}")
     assert "xx" not in str(told.value)
+
+
+def test_of_modules_that_use_a_key_those_that_speak_of_its_table_read_it(monkeypatch):
+    used = {
+        "microrad.mission.tables.laser": {"gain_db", "Laser"}, "microrad.link.a": {"gain_db", "Laser"},
+        "microrad.link.b": {"gain_db", "laser", "loss_db"}, "microrad.link.c": {"gain_db"},
+        "microrad.link.d": {"Laser", "laser"}, "microrad.loop": {"loss_db", "Other"},
+    }  # fmt: skip
+    monkeypatch.setattr(explain, "_used", lambda: used)
+    assert explain._readers("Laser", "laser", "gain_db") == ("microrad.link.a", "microrad.link.b")
+    assert explain._readers("Laser", "", "loss_db") == ("microrad.link.b", "microrad.loop")
+    assert explain._readers("Other", "laser", "loss_db") == ("microrad.link.b", "microrad.loop")
+    del used["microrad.link.a"], used["microrad.link.b"]
+    assert explain._readers("Laser", "laser", "gain_db") == ("microrad.link.c",)
+    del used["microrad.link.c"]
+    assert explain._readers("Laser", "laser", "gain_db") == ("microrad.mission.tables.laser",)
+    assert explain._readers("Laser", "laser", "width_m") == ()
+
+
+def test_a_module_uses_its_attributes_and_but_for_tables_its_names(tmp_path, monkeypatch):
+    texts = {
+        "link/__init__.py": "made(Laser)",
+        "link/beam.py": "µ = source.gain_db + self.of.loss_db",
+        "mission/tables/laser.py": "Laser(table.gain_db)",
+        "mission/file.py": "def read(path):\n    return Laser",
+        "top.py": "",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    monkeypatch.setattr(explain.resources, "files", lambda package: tmp_path)
+    assert explain._used.__wrapped__() == {
+        "microrad.link": {"made", "Laser"},
+        "microrad.link.beam": {"μ", "source", "self", "of", "gain_db", "loss_db"},
+        "microrad.mission.tables.laser": {"gain_db"},
+        "microrad.mission.file": {"Laser"},
+        "microrad.top": set(),
+    }
+
+
+def test_a_key_of_several_files_is_shipped_with_the_mission_alone_and_keys_of_a_name_are_inside_it():
+    found = {(key.file, key.name): key for key in explained("name")}
+    assert list(found) == [(file, "name") for file in FILES]
+    assert [bool(key.shipped) for key in found.values()] == [True, False, False]
+    (relays,), (relay,) = explained("constellation.relays"), explained("constellation.relays.east")
+    assert (relays.inside, relay.inside) == ((), ("longitude",))
+    assert (relay.name, relay.holds, relay.default, relay.shipped) == (
+        *("constellation.relays.NAME", "a table", "nothing", ""),
+    )
+    assert [key.name for key in explained("bias")] == ["bias"]
+    assert {key.name for key in explained("rate_limit")} == {"rate_limit"}
+    errors = [key.name for key in explained("standard_errors")]
+    assert errors == ["mirror.uncertainty.standard_errors", *["uncertainty.standard_errors"] * 2]

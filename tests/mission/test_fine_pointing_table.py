@@ -894,3 +894,31 @@ def test_one_large_number_anywhere_in_a_coupling_of_a_small_area_makes_it_singul
     numbers = [1.0, 1.0, 1.0, 1.0]
     numbers[place] = 1.0 + 1e-4  # the area is this much, the squares four
     assert fine_pointing_table._singular(tuple(numbers), 1.0) is True
+
+
+@pytest.mark.parametrize(("delay_s", "step_s", "key", "better"), [
+    (33e-6, 10e-6, "delay", 'delay = "30 µs" would do'),
+    (37e-6, 10e-6, "delay", 'delay = "40 µs" would do'),
+    (4e-6, 10e-6, "delay", 'delay = "0 s" would do'),
+    (37e-6, 60e-6, "plant_step", 'a whole fraction of it: plant_step = "62.5 µs" would do'),
+    (37e-6, 65e-6, "plant_step", 'a whole fraction of it: plant_step = "62.5 µs" would do'),
+    (0.0, 190e-6, "plant_step", 'a whole fraction of it: plant_step = "250 µs" would do'),
+    (0.0, 900e-6, "plant_step", 'a whole fraction of it: plant_step = "250 µs" would do'),
+])  # fmt: skip
+def test_a_delay_and_a_step_that_miss_whole_steps_to_either_side_are_told_with_the_nearest(
+    delay_s, step_s, key, better
+):
+    (found,) = clock_problems("bench", 4000.0, delay_s, step_s)
+    assert (found.key, found.expected) == (key, better)
+    assert not list(clock_problems("bench", 4000.0, 125e-6, 62.5e-6))
+
+
+@pytest.mark.parametrize(("rate_hz", "better"), [
+    (2600.0, '"2.08333333333 kHz"'), (4400.0, '"3.125 kHz"'), (4800.0, '"6.25 kHz"'), (5900.0, '"6.25 kHz"'),
+    (1600.0, '"1.5625 kHz"'), (1500.0, '"1.5625 kHz"'),
+])  # fmt: skip
+def test_a_rate_of_a_sensor_that_misses_a_fraction_of_the_loops_to_either_side_is_told_with_the_nearest(
+    rate_hz, better
+):
+    (found,) = clocked(optical_sensor=SimpleNamespace(rate_hz=rate_hz, delay_s=0.0)).problems()
+    assert (found.key, found.expected) == ("optical_sensor.rate", f"rate = {better} would do")

@@ -1172,3 +1172,40 @@ def test_links_are_read_from_a_text_in_place_of_a_file_that_need_not_be_there(tm
         '"3 s"',
         str(tmp_path / "nowhere" / "links.toml"),
     )
+
+
+@pytest.mark.parametrize(
+    ("given", "light", "is_random"),
+    [
+        (
+            {"into": "detector", "detector_radius_m": 5e-5, "focal_length_m": 0.5, "lateral_error_m": 0.0},
+            *("into detector_radius focal_length lateral_error", False),
+        ),
+        (
+            {"into": "single-mode fibre", "mode_radius_m": math.nan, "coma_m": -1e-8, "pointing_error_rad": 0.0},
+            *("into mode_radius coma", False),
+        ),
+        (
+            {"into": "multi-mode fibre", "spherical_m": 0.0, "jitter": 0, "angular_error_rad": 0.0, "twin": False},
+            *("into angular_error spherical", True),
+        ),
+        ({"into": "detector", "astigmatism_m": 0.0, "defocus_m": 1e-8, "twin": True}, "into defocus astigmatism", True),
+        ({"into": "detector", "twin": False}, "into", False),
+    ],
+)
+def test_what_takes_the_light_is_said_by_all_keys_but_those_of_how_the_receiver_points(given, light, is_random):
+    table = made(Coupling, **given)
+    assert " ".join(table.keys_of_light) == light
+    assert table.is_random is is_random
+
+
+def test_a_strehl_and_a_wavefront_error_of_nought_are_there():
+    for given, words in (
+        ({"strehl": 0.0}, ""),
+        ({"wavefront_error_m": 0.0}, ""),
+        ({"wavefront_error_m": 0.375e-6}, ""),
+        ({"strehl": 0.0, "wavefront_error_m": 0.0}, "strehl stands beside wavefront_error: expected one of the two"),
+        ({}, "strehl is missing, and so is wavefront_error: expected strehl = 0.4 would do"),
+    ):
+        found = told(made(Beam, wavelength_m=1.5e-6, **given).problems())
+        assert found.startswith(words) and bool(found) is bool(words)

@@ -28,18 +28,21 @@ from microrad.mission import model, toml
 from microrad.mission.fields import Bounded, Monthly, OrWord, ProblemsError, Quantity, Several, Share, Switch, Whole
 from microrad.mission.file import (
     MissionError,
+    _content,
     assumptions,
     load_coupled_mirror,
     load_link,
     load_mirror,
     load_mission,
     mission_file,
+    named_files,
     open_mission,
     with_values,
 )
 from microrad.mission.model import (
     Amplifier,
     Control,
+    LinkMission,
     Mission,
     Source,
     _bias_fits,
@@ -2660,3 +2663,81 @@ def test_an_example_of_a_value_is_one_that_would_be_taken(rule, value, reason, e
     assert (error.reason, error.expected, error.example) == (reason, expected, example)
     assert str(error) == f'"{value}" {reason}; expected {expected}, for example "{example}"'
     assert rule.out_of_bounds(rule.read(example)) == ""
+
+
+@pytest.mark.parametrize("folder", ["of\x1b[31m ours", "f" * 130])
+def test_faults_of_a_file_whose_path_is_long_or_would_steer_a_terminal_stand_before_those_of_its_mirror(
+    tmp_path, folder
+):
+    path, given = tmp_path / folder / "mission.toml", tmp_path / "a.toml"
+    path.parent.mkdir()
+    path.write_text(edited("communication.distance", '"44000"'), encoding="utf-8")
+    given.write_text(edited("travel", '"2.5 m"', MIRROR_TEXT), encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load_mission(path, given)
+    told_of = str(path).replace("\x1b", "\\u001b") if len(str(path)) < 120 else f"{str(path)[:60]}…"
+    assert [(fault.file, fault.key) for fault in refused.value.faults] == [
+        (told_of, "communication.distance"),
+        (str(given), "mirror.travel"),
+    ]
+    first, second, *_ = str(refused.value).splitlines()
+    assert first == f"{told_of}: 2 faults to correct"
+    assert second.startswith(f"{told_of}, line {line_of('communication.distance', TEXT)}: communication.distance")
+    path.write_text("\0", encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load_mission(path)
+    assert (str(refused.value.path), refused.value.faults[0].file) == (str(path), told_of)
+
+
+@pytest.mark.parametrize(
+    ("key", "reason"),
+    [
+        ("scenario.pid_frequencies", "is not a list with something in it"),
+        ("scenario.amplitude", "is not a quantity in quotes"),
+        ("point_ahead.corrected", "is neither true nor false"),
+        ("requirement.residual_statistic", "is none of the choices"),
+    ],
+)
+def test_a_table_where_a_value_belongs_is_shown_as_one(refuse, key, reason):
+    text = edited(key, None) + f"\n[{key}]\nfirst = 1\n"
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.value, fault.reason) == (key, "(a table)", reason)
+    assert fault.line == line_of(key, text)
+
+
+def test_the_first_item_of_a_list_is_looked_at_by_itself():
+    mirror = known()
+    assert tuple(place(mirror, "linear.pole_dampings.1")) == ("linear", "pole_dampings", 0)
+    linear = mirror.linear.model_copy(update={"poles_hz": (0.0, 900.0, 1e3)})
+    slow = mirror.model_copy(update={"linear": linear})
+    assert tuple(place(slow, "linear.poles.2")) == ("linear", "poles_hz", 1)
+    (problem,) = refused(place, slow, "linear.poles.1")
+    assert problem.reason == 'has "linear.poles.1", which is 0 in this mirror, and nothing is relative to 0'
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_that_a_mission_names_is_not_waited_for(tmp_path):
+    for name in ("satellite.tle", "vibration.csv"):
+        os.mkfifo(tmp_path / name)
+    (tmp_path / "folder.oem").mkdir()
+    (tmp_path / "series.csv").write_bytes(b"\xff1")
+    names = ("satellite.tle", "folder.oem", "series.csv", "none.csv", "a\0b", "vibration.csv")
+    with no_hang():
+        assert [_content(tmp_path / name) for name in names] == [None, None, b"\xff1", None, None, None]
+
+
+def test_files_that_a_mission_names_are_those_of_its_orbits_its_constellation_its_fading_and_its_loop():
+    ends = SimpleNamespace(leo=SimpleNamespace(file="a"), geo=SimpleNamespace(file="b"))
+    swarm, fading = SimpleNamespace(file="c"), SimpleNamespace(fading=SimpleNamespace(series="d"))
+    loop = SimpleNamespace(vibration=SimpleNamespace(file="e"), mirror_file="f")
+    plain, none = SimpleNamespace(fading=None), SimpleNamespace(file=None)
+    for table in (Mission, LinkMission):
+        of_all = made(table, orbit=ends, constellation=swarm, communication=fading, fine_pointing=loop)
+        assert "".join(named_files(of_all)) == ("abcdef" if table is Mission else "abcd")
+        again = SimpleNamespace(leo=none, geo=SimpleNamespace(file="c"))
+        few = made(table, orbit=again, constellation=swarm, communication=plain)
+        assert named_files(few) == ("c",)
+        assert named_files(made(table, communication=plain)) == ()
+        assert named_files(made(table, communication=fading, constellation=none)) == ("d",)
+    half = SimpleNamespace(vibration=none, mirror_file="f")
+    assert named_files(made(Mission, communication=fading, fine_pointing=half)) == ("d", "f")

@@ -156,3 +156,11 @@ def test_a_shipped_value_of_several_lines_is_told_in_one(monkeypatch):
     assert origins.of_paper("a.b", "[1.50, 2.5]") == origins.written_for("a.b", "paper: Table 1", "[1.50, 2.5]") == ""
     assert origins.written_for("a.b", "", "[1.5]") == origins.written_for("a", "paper: Table 1", "[1.5]") == ""
     assert origins.is_shipped("a.b", "[1.5, 2.5]") and not origins.is_shipped("c", "1")
+
+
+@pytest.mark.parametrize(
+    ("value", "other"), [('["a", "b"]', '"ab"'), ("[2]", "2"), ("[]", '""'), ("[[1]]", "[1]"), ('["5 W"]', '"5 W"')]
+)
+def test_a_list_is_no_text_and_no_number_whatever_is_in_it(value, other):
+    assert origins._same(value, other) is origins._same(other, value) is False
+    assert origins._same(value, value) is origins._same(other, other) is True

@@ -407,3 +407,39 @@ def test_a_cell_of_sixty_letters_is_told_whole_and_a_longer_one_by_its_begin(tmp
         read_sources(path)
     told_name = name[:shown] + "…" * (length > 60)
     assert str(refused.value) == (f"{path}, row 2, {told_name}: x is empty before y; give 0 where nothing gets there")
+
+
+@pytest.mark.parametrize(
+    ("row", "head", "said"),
+    [
+        ("a,constant,1 urad,,fixed,each,,,1", HEADING, ", row 2, a: x is empty before z; give 0 where nothing gets"),
+        ("a", "name,length,class,gain,x", ': no column is called "length"; its first row'),
+        ("a", "name,size,x,class", ': it has no column "statistic"; its first row'),
+        ("a", "name,size,extent", ': no column is called "extent"; its first row'),
+        ("a,constant,1 urad,7,8", "name,class,,,size,statistic,axes,x", ', row 2: "1 urad" stands in a column without'),
+    ],
+)
+def test_of_several_cells_and_columns_that_do_not_fit_the_first_is_told(tmp_path, row, head, said):
+    path = listed(tmp_path, row, head=head)
+    with pytest.raises(SourceListError) as refused:
+        read_sources(path)
+    assert str(refused.value).startswith(f"{path}{said}")
+
+
+def test_the_first_row_alone_says_what_separates_cells_and_blanks_need_no_name(tmp_path):
+    row = 'a,constant,1 urad,,fixed,each,1,0.5,,"one; two; three; four; five; six; seven; eight; nine; ten; eleven"'
+    head = "name,class,size,rate,statistic,axes,x,y,z,origin,,"
+    (found,) = read_sources(listed(tmp_path, f"{row},  ,", head=head))
+    assert (found.name, found.source.gains) == ("a", (1.0, 0.5))
+    assert found.origin == "one; two; three; four; five; six; seven; eight; nine; ten; eleven"
+
+
+def test_what_the_parts_of_a_workbook_unpack_to_counts_together(tmp_path, monkeypatch):
+    pytest.importorskip("openpyxl", reason="the extra xlsx is not installed")
+    monkeypatch.setattr(source_list, "_MOST_UNPACKED_BYTES", 3_000_000)
+    path = tmp_path / "parts.xlsx"
+    with ZipFile(path, "w", ZIP_DEFLATED) as book:
+        for name, size in (("a", 1_000_000), ("b", 1_500_000), ("c", 2_500_000)):
+            book.writestr(f"xl/{name}.xml", bytes(size))
+    with pytest.raises(SourceListError, match=r"is no workbook .it unpacks to 5 MB"):
+        read_sources(path)
