@@ -2089,3 +2089,45 @@ def test_a_message_of_another_kind_is_no_ephemeris_whatever_its_version(tmp_path
     text = HEAD.replace("CCSDS_OEM_VERS = 2.0", f"{key} = {version}") + segment(GRID)
     no_ephemeris(tmp_path, text, f"line 1: the file begins with {key} = '{version}', not with CCSDS_OEM_VERS = 1, 2 or")
     ephemeris(tmp_path, HEAD.replace("2.0", version) + segment(GRID))
+
+
+def test_objects_of_one_name_or_whose_name_is_anothers_identifier_are_told_apart_by_what_is_left(tmp_path):
+    parts = [
+        segment(GRID[:40], OBJECT_NAME="Twin", OBJECT_ID="2026-001A"),
+        segment(GRID[10:70], OBJECT_NAME="Twin", OBJECT_ID="2026-001B"),
+        segment(GRID[40:90], OBJECT_NAME="Twin", OBJECT_ID="2026-001A"),
+        segment(GRID[20:50], OBJECT_NAME="2026-001b", OBJECT_ID="2026-001C"),
+    ]
+    text = HEAD + "".join(parts)
+    first = ephemeris(tmp_path, text, name="2026-001a")
+    assert (first.name, len(first.segments), first.span_s) == ("Twin", 2, (0.0, GRID[89]))
+    only = ephemeris(tmp_path, text, name="2026-001c")
+    assert (only.name, len(only.segments), only.span_s) == ("2026-001b", 1, (GRID[20], GRID[49]))
+    for name in ("TWIN", "2026-001B"):
+        with pytest.raises(OrbitError) as refused:
+            ephemeris(tmp_path, text, name=name)
+        assert str(refused.value).endswith(
+            "it holds the objects Twin (2026-001A), Twin (2026-001B), 2026-001b (2026-001C), "
+            f"and {name!r} names 2 of them; name one of them"
+        )
+
+
+def test_of_a_combined_message_the_ephemeris_and_the_elements_are_each_read_without_the_others(tmp_path):
+    prolog, ours = oem_xml(GRID).split("\n", 1)
+    vector = "".join(f"<{key}>{7000.0 + k}</{key}>" for k, key in enumerate(("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")))
+    other = (
+        '<opm id="CCSDS_OPM_VERS" version="2.0"><header/><body><segment><metadata><OBJECT_NAME>STRANGER</OBJECT_NAME>'
+        "<OBJECT_ID>1998-067A</OBJECT_ID><BSTAR>7</BSTAR></metadata><data><stateVector>"
+        f"<EPOCH>{stamp(30)}</EPOCH>{vector}</stateVector></data></segment></body></opm>"
+    )
+    omm = xml(FIELDS).partition("<ndm>")[2].removesuffix("</ndm>")
+    for parts in ((other, omm, ours), (ours, other, omm), (omm, ours, other)):
+        text = f"{prolog}\n<ndm>{''.join(parts)}</ndm>"
+        found = ephemeris(tmp_path, text)
+        assert (found.name, found.span_s) == (ephemeris(tmp_path, oem_xml(GRID)).name, (0.0, 6000.0))
+        (one,) = elements(tmp_path, text)
+        assert (one.name, one.drag_per_earth_radius) == ("EXAMPLE 1", float(FIELDS["BSTAR"]))
+    with pytest.raises(OrbitError, match="no element set is in the file; give a TLE or an OMM"):
+        elements(tmp_path, f"{prolog}\n<ndm>{other}{ours}</ndm>")
+    with pytest.raises(OrbitError, match="no segment of an ephemeris"):
+        ephemeris(tmp_path, f"{prolog}\n<ndm>{omm}{other}</ndm>")
