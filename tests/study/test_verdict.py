@@ -653,3 +653,24 @@ def test_the_claims_come_in_the_order_of_the_paper_and_those_without_a_base_are_
         *("_together_claim", "_day_claims 1", "_day_claims 2"),
     )
     assert claims(None, None, None) == (*links, "_travel_claim", "_loops_claim", "_worse_claim", *drops)
+
+
+def test_runs_are_held_against_those_of_their_own_controller_and_frequency_without_hysteresis():
+    variants, controllers = (Variant.STRAIGHT, Variant.GIVEN, Variant.COMPARISON), (PID, PID_WITH_INVERSE)
+    runs = {(v, c, f): sine(v, c, f) for c in controllers for v in variants for f in (1.0, 15.0, 25.0)}
+    del runs[Variant.STRAIGHT, PID, 25.0], runs[Variant.GIVEN, PID_WITH_INVERSE, 1.0]
+    for controller, frequencies in ((PID, (1.0, 15.0)), (PID_WITH_INVERSE, (15.0, 25.0))):
+        found = verdict._pairs(evidence(*runs.values()), controller)
+        assert len(found) == 2
+        for (one, other), freq_hz in zip(found, frequencies, strict=True):
+            assert one is runs[Variant.GIVEN, controller, freq_hz]
+            assert other is runs[Variant.STRAIGHT, controller, freq_hz]
+
+
+@pytest.mark.parametrize(
+    ("rises", "told"), [(13.996, "13.996"), (14.004, "14.004"), (15.996, "15.996"), (16.004, "16.004"), (14.96, "15")]
+)
+def test_rises_that_miss_fourteen_or_sixteen_a_day_have_the_digits_that_tell_it(rises, told):
+    claim = verdict._day_claims(a_day(rises=rises * 1000.0, days=1000.0))[0]
+    assert claim.ours == f"the relay rises {told} times a day"
+    assert claim.agrees == ("yes" if 14.0 <= rises <= 16.0 else "no")
