@@ -1,5 +1,6 @@
 """The local engine: whatever a job does to its process, the others come out, and nothing is left behind."""
 
+import asyncio
 import io
 import json
 import logging
@@ -1199,3 +1200,176 @@ def test_what_ended_within_a_slice_is_heard_before_what_is_late():
     engine._stop_the_late = lambda: iter(["late"])
     assert [list(engine._wait("jobs")) for _ in range(3)] == [["late"], [(5, "jobs"), "late"], ["late"]]
     assert waited == [engine_jobs.SLICE_S] * 3
+
+
+def test_a_worker_whose_parent_is_gone_ends_at_once(monkeypatch):
+    """Only where that takes an error of the system: a message that is no message is a fault of the worker."""
+    ended = []
+    monkeypatch.setattr(engine_worker.os, "_exit", ended.append)
+    said = io.BytesIO()
+    engine_worker._tell(said, Message(Kind.DONE, b"abc"))
+    assert (said.getvalue(), ended) == (b"\x05\x03\0\0\0\0\0\0\0abc", [])
+    for error in (BrokenPipeError(), OSError(28, "full")):
+        monkeypatch.setattr(engine_worker, "write_message", raising(error))
+        engine_worker._tell(said, Message(Kind.BEAT))
+    assert ended == [1, 1]
+    monkeypatch.setattr(engine_worker, "write_message", raising(TypeError("odd")))
+    with pytest.raises(TypeError):
+        engine_worker._tell(said, Message(Kind.BEAT))
+    assert ended == [1, 1]
+
+
+def raising(error):
+    def call(*given):
+        raise error
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("system", "parent", "asked", "ended", "dies"),
+    [("linux", 7, [(1, signal.SIGKILL)], [], True), ("linux", 8, [(1, signal.SIGKILL)], [1], True),
+     ("darwin", 7, [], [], False), ("win32", 8, [], [], False)],
+)  # fmt: skip
+def test_a_worker_asks_to_be_killed_with_its_parent_where_the_system_can(
+    monkeypatch, system, parent, asked, ended, dies
+):
+    """A parent that had ended before the call is another one by now."""
+    calls, exits = [], []
+    library = SimpleNamespace(prctl=lambda *given: calls.append(given))
+    monkeypatch.setattr(engine_worker.ctypes, "CDLL", lambda name: {None: library}[name])
+    monkeypatch.setattr(engine_worker.os, "getppid", lambda: 7)
+    monkeypatch.setattr(engine_worker.os, "_exit", exits.append)
+    monkeypatch.setattr(engine_worker.sys, "platform", system)
+    found = engine_worker.die_with_parent(parent)
+    monkeypatch.undo()
+    assert (found, calls, exits) == (dies, asked, ended)
+
+
+def test_a_worker_keeps_its_pipes_for_messages_and_prints_beside_them(monkeypatch):
+    """What it reads is nothing from then on, and what it prints goes where errors go."""
+    done = []
+    calls = {
+        "dup": lambda of: 40 + of,
+        "fdopen": lambda of, mode: (of, mode),
+        "open": lambda name, flags: (done.append(("open", name, flags)), 50)[1],
+        "dup2": lambda of, at: done.append(("dup2", of, at)),
+        "close": lambda of: done.append(("close", of)),
+    }
+    system = SimpleNamespace(devnull=os.devnull, O_RDONLY=os.O_RDONLY, **calls)
+    printing = SimpleNamespace(stdout="out", stderr="err")
+    monkeypatch.setattr(engine_worker, "os", system)
+    monkeypatch.setattr(engine_worker, "sys", printing)
+    assert engine_worker._take_pipes() == ((40, "rb"), (41, "wb"))
+    assert done == [("open", os.devnull, os.O_RDONLY), ("dup2", 50, 0), ("close", 50), ("dup2", 2, 1)]
+    assert printing.stdout == "err"
+
+
+def test_an_engine_refuses_a_worker_of_other_code_than_its_first():
+    first, second, third = (SimpleNamespace(ready=False) for _ in range(3))
+    engine = an_engine()
+    engine._code = ""
+    engine._worker_ready(first, "abc")
+    engine._worker_ready(second, "abc")
+    with pytest.raises(CampaignError) as told:
+        engine._worker_ready(third, "abd")
+    assert str(told.value) == (
+        "the code of microrad changed while the campaign ran: it began with abc, now it is abd; go back to the first, "
+        "or begin the campaign anew"
+    )
+    assert ([each.ready for each in (first, second, third)], engine._code) == ([True, True, False], "abc")
+
+
+def test_an_engine_stops_those_workers_that_it_is_told_and_passes_over_those_that_another_thread_took():
+    killed = []
+    workers = [SimpleNamespace(kill=lambda k=k: killed.append(k)) for k in range(4)]
+    engine = an_engine(*workers[:3])
+    engine._stop(workers[2], workers[3], workers[0])
+    assert (killed, engine._workers) == ([2, 3, 0], [workers[1]])
+
+
+@pytest.mark.parametrize("answer", ["says who it is", "says nothing", "breaks"])
+def test_a_scheduler_is_asked_who_it_is_and_let_go_whatever_it_says(monkeypatch, answer):
+    done = []
+
+    class Scheduler:
+        async def identity(self):
+            done.append("asked")
+            if answer == "breaks":
+                raise OSError("reset")
+            if answer == "says nothing":
+                await asyncio.Event().wait()
+
+        async def close_rpc(self):
+            done.append("closed")
+
+    package = SimpleNamespace(rpc=lambda address: (done.append(address), Scheduler())[1])
+    monkeypatch.setattr(cluster, "_CONNECT_S", 0.01)
+    if answer == "says who it is":
+        assert asyncio.run(cluster._asked(package, "tcp://a:1")) is None
+    else:
+        told = {"says nothing": "it did not answer for 0.01 s", "breaks": "reset"}[answer]
+        with pytest.raises(TimeoutError if answer == "says nothing" else OSError, match=f"^{told}$"):
+            asyncio.run(cluster._asked(package, "tcp://a:1"))
+    assert done == ["tcp://a:1", "asked", "closed"]
+
+
+def test_a_scheduler_is_told_on_the_loop_of_the_worker_under_the_topic_of_the_campaign(monkeypatch):
+    utils, asked = pytest.importorskip("distributed.utils"), []
+    monkeypatch.setattr(utils, "sync", lambda *given, **more: asked.append((given, more)))
+    worker = SimpleNamespace(loop="loop", scheduler=SimpleNamespace(log_event="log"))
+    cluster._tell_now(worker, "topic", [7, "tcp://a"])
+    assert asked == [(("loop", "log"), {"topic": "topic", "msg": [7, "tcp://a"]})]
+
+
+def test_a_client_of_the_cluster_is_no_default_and_hears_the_topic_of_its_campaign(monkeypatch):
+    made, engine = [], a_cluster(_topic="topic-7", address="tcp://a:1")
+
+    class Client:
+        def __init__(self, *given, **options):
+            made.append((given, options))
+
+        def subscribe_topic(self, *given):
+            made.append(given)
+
+    async def answers(package, address):
+        made.append((package.__class__, address))
+
+    monkeypatch.setattr(cluster, "_asked", answers)
+    package = SimpleNamespace(Client=Client)
+    assert isinstance(engine._connect(package), Client)
+    assert made == [
+        (SimpleNamespace, "tcp://a:1"),
+        (("tcp://a:1",), {"timeout": cluster._CONNECT_S, "set_as_default": False}),
+        ("topic-7", engine._hear),
+    ]
+
+
+def test_a_call_to_the_cluster_has_its_time_to_answer():
+    asked, engine = [], object.__new__(DaskEngine)
+    engine._client = SimpleNamespace(sync=lambda *given, **more: (asked.append((given, more)), "answer")[1])
+    assert engine._call("method", 1, "b", workers=["a"]) == engine._call("other", answer_s=1.5) == "answer"
+    assert asked == [
+        (("method", 1, "b"), {"callback_timeout": cluster._ANSWER_S, "workers": ["a"]}),
+        (("other",), {"callback_timeout": 1.5}),
+    ]
+
+
+def test_a_campaign_has_a_name_on_workers_of_its_function_code_and_specification(monkeypatch):
+    """The same for the same campaign; a topic is of one engine alone."""
+    monkeypatch.setattr(cluster, "_distributed", lambda: "package")
+    monkeypatch.setattr(cluster, "_quiet", lambda: None)
+    monkeypatch.setattr(cluster, "Clock", lambda: SimpleNamespace(now=lambda: 42.0))
+    monkeypatch.setattr(DaskEngine, "_connect", lambda self, package: (package, self.address))
+    made = []
+    for spec, target, code in ((b"a", "m:f", "c"), (b"a", "m:f", "c"), (b"b", "m:f", "c"), (b"a", "m:g", "c"),
+                               (b"a", "m:f", "d"), (b"c\0a", "m:f", ""), (b"", "m:f\0c", "a")):  # fmt: skip
+        monkeypatch.setattr(cluster, "code_sha256", lambda of, code=code: code)
+        made.append(DaskEngine(spec, target, "tcp://a:1", 7.0))
+    names = [each._name for each in made]
+    assert names[0] == names[1] and len(set(names)) == 6
+    assert len({each._topic for each in made}) == 7
+    first = made[0]
+    assert (first._client, first._late_s, first._workers_seen_s) == (("package", "tcp://a:1"), 7.0, 42.0)
+    assert (first._spec, first._target, first._code, first._serial) == (b"a", "m:f", "c", 0)
+    assert first._looked_s == -math.inf and not first._flights and not first._installed

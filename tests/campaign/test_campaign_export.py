@@ -9,6 +9,7 @@ import random
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import h5netcdf
@@ -490,3 +491,65 @@ def test_a_table_that_cannot_be_written_is_told_by_its_path_and_reason(tmp_path,
     assert reason.startswith(str(error))
     assert str(told.value) == f"{target} could not be written ({reason}), so nothing is: free space, or choose another"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "made", "attrs"),
+    [
+        ("float", "W", (("index",), "f8", (12,), False), {"long_name": "what it is", "units": "W"}),
+        ("float", "", (("index",), "f8", (12,), False), {"long_name": "what it is", "units": "1"}),
+        ("int", "", (("index",), "i8", (12,), True), {"long_name": "what it is", "units": "1"}),
+        (
+            "text", "", (("index", "a|b characters"), "S1", (12, 7), True),
+            {"long_name": "what it is", "_Encoding": "utf-8"},
+        ),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize(("rows", "most"), [(12, 16384), (40, 12)])
+def test_a_column_of_netcdf_has_its_checksum_and_is_compressed_where_it_repeats_itself(
+    monkeypatch, kind, unit, made, attrs, rows, most
+):
+    asked, variable = [], type("Variable", (), {"attrs": {}})
+    variable.attrs = {}
+
+    class File:
+        def create_variable(self, *given, **options):
+            asked.append((given, options))
+            return variable
+
+    monkeypatch.setattr(export, "_ROWS", most)
+    field = export._Field("a/b", unit, "what it is", kind)
+    assert export._variable(File(), field, {"c": 3, "a/b": 7}, rows) is variable
+    dims, code, chunks, packed = made
+    more = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if packed else {}
+    assert asked == [(("a|b", dims, code), {"chunks": chunks, "fletcher32": True, **more})]
+    assert variable.attrs == attrs
+
+
+@pytest.mark.parametrize("together", [3, 100])
+def test_a_table_is_as_long_as_its_rows_and_a_text_as_wide_as_the_longest_of_all_its_blocks(
+    tmp_path, monkeypatch, together
+):
+    """In bytes; the longest stands in the first cell, in the second, and nowhere."""
+    cells = ({"mirror": "µµµ", "set": "a", "at": ""}, {"mirror": "abcd", "set": "bbb", "at": ""})
+    with Ledger.create(tmp_path / "a.ledger", head(cells)) as book:
+        for cell, number in ((0, 0), (0, 1), (1, 0)):
+            columns = {c.name: np.arange(4.0) + 4 * number for c in COLUMNS}
+            lost = (Failed(6, 1, 2, "no µ"),) if number else ()
+            done = Chunk(cell, number, columns, lost, np.zeros(0), np.zeros(0))
+            book.put(cell, number, chunk_format.pack_chunk(done))
+        monkeypatch.setattr(export, "_ROWS", together)
+        found = export._extent(book, export._fields(book.head))
+    assert found == (12, {"mirror": 6, "set": 3, "at": 1, "failed": 5})
+
+
+def test_a_table_tells_its_origin_the_same_whatever_order_its_versions_were_noted_in():
+    versions = {"scipy": "1.2", "numpy": "2 µ", "microrad": "0"}
+    hashes = {"mission": "bb", "campaign": "aa"}
+    for order in (1, -1):
+        told = replace(head(), versions=dict(list(versions.items())[::order]), hashes=hashes, mission_name="µ", seed=7)
+        found = export._origin(told)
+        assert found == {
+            "title": "µ", "campaign": "c.toml", "seed": "7", "mission_sha256": "bb", "campaign_sha256": "aa",
+            "versions": '{"microrad": "0", "numpy": "2 \\u00b5", "scipy": "1.2"}',
+        }  # fmt: skip

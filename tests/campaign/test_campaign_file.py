@@ -18,7 +18,7 @@ from made_tables import one_line
 from microrad import link
 from microrad.campaign import bundle
 from microrad.campaign import file as campaign_file
-from microrad.campaign.definition import cells, draws, keys
+from microrad.campaign.definition import cells, draws, keys, reader
 from microrad.campaign.definition.distributions import OneOf, uncovered
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.definition.reader import block_rows, read_definition
@@ -2041,3 +2041,53 @@ def test_a_variable_that_is_drawn_or_set_too_is_told_with_the_first_table_that_h
         ("optimise.variables.communication.transmit_power", "stands in [inputs] too", expected),
         ("optimise.variables.terminals.leo_aperture", "stands in [set] too", expected),
     ]
+
+
+@pytest.mark.parametrize("item_in", ["set", "grid", "inputs", "optimise.variables"])
+@pytest.mark.parametrize("list_in", ["set", "grid", "inputs", "optimise.variables"])
+def test_an_item_may_stand_in_a_table_behind_that_of_its_list_where_this_is_set_or_a_grid(list_in, item_in):
+    """The list is the second key of its table, and the item stands behind another one of a list of its own."""
+    order = ["set", "grid", "inputs", "optimise.variables"]
+    tables = {name: {f"{name}.first": 1} for name in order}
+    tables[list_in]["jitter.rms"] = 2
+    tables[item_in] |= {"scenario.pid_frequencies.1": 3, "jitter.rms.2": 4}
+    made, noted = object.__new__(reader._DefinitionReader), []
+    made.fixed, made.grid, made.inputs = (tables[name] for name in order[:3])
+    made.table = SimpleNamespace(optimise=SimpleNamespace(variables=tables["optimise.variables"]))
+    made.reader = SimpleNamespace(fault=lambda *told: noted.append(told))
+    made._check_doubles()
+    may = list_in in ("set", "grid") and order.index(list_in) < order.index(item_in)
+    assert noted == [] if may else noted == [
+        (
+            f"{item_in}.jitter.rms.2", None, f"is an item of jitter.rms, which stands in [{list_in}] as a whole",
+            "the list, or its items, in one of the two tables",
+        )
+    ]  # fmt: skip
+
+
+def test_a_mirror_may_be_drawn_beside_its_grid_or_its_own_parameters_and_nothing_else_twice():
+    made = object.__new__(reader._DefinitionReader)
+    made.fixed, made.grid = {"mirror.bias": 1}, {"mirror": ["a.toml", "b.toml"], "mirror.travel": 2}
+    made.inputs, made.table = {"mirror": 3, "mirror.bias": 4}, None
+
+    def told():
+        noted = []
+        made.reader = SimpleNamespace(fault=lambda key, *of: noted.append((key, of[1])))
+        made._check_doubles()
+        return noted
+
+    assert told() == [("inputs.mirror.bias", "stands in [set] too")]
+    made.fixed = {"mirror": "c.toml"}
+    assert told() == [("grid.mirror", "stands in [set] too")]
+
+
+def test_the_middle_of_an_input_is_that_of_its_own_distribution_whatever_it_is_drawn_as(tmp_path):
+    power = POWER + DRAWN_AS.format("normal", 'mean = "7 W"\ndeviation = "0.3 W"')
+    loss = distributed("communication.implementation_loss", 'distribution = "uniform"\nlow = "1 dB"\nhigh = "2 dB"')
+    grid = '[grid]\n"terminals.leo_aperture" = ["5 cm", "6 cm"]\n'
+    campaign, document = read_definition(written(tmp_path, HEAD + power + loss + grid))
+    found = campaign_file._medians(campaign, document)
+    values = [(m.communication.transmit_power_w, m.terminals.leo_aperture_m) for m in (each.mission for each in found)]
+    assert values == [(pytest.approx(5.0), pytest.approx(0.05)), (pytest.approx(5.0), pytest.approx(0.06))]
+    assert {each.mission.communication.implementation_loss_db for each in found} == {1.5}
+    assert document.faults == []

@@ -439,3 +439,45 @@ def test_levels_are_aimed_by_the_loop_and_the_straight_one_with_the_same_numbers
     other = Span(0.4, 0.05, 3 ^ 0x54494C54)
     assert flown == [("loop", "controller", other), ("straight", ("controller", "loop"), other)]
     assert taken == [("loop", {parts.REFERENCE, parts.HYSTERESIS, parts.QUANTISATION, parts.LIMITS})]
+
+
+def test_what_a_number_does_to_the_end_of_a_run_is_what_it_does_step_by_step(monkeypatch):
+    """Two phases of the sensor, three unlike plant steps of a sample, two sources, two readings and two axes."""
+    draw = np.random.default_rng(5)
+    steps = [0.5 * draw.normal(size=(4, 4)) for _ in range(3)]
+    samples = [0.5 * draw.normal(size=(4, 4)) for _ in range(2)]
+    noise, readings = draw.normal(size=(4, 2)), [draw.normal(size=(4, 2)) for _ in range(2)]
+    error = draw.normal(size=(2, 3))
+    closed = SimpleNamespace(
+        open=SimpleNamespace(error=error, at=SimpleNamespace(order=3)),
+        steps=steps, samples=samples, step_noise=noise, sample_noise=readings,
+    )  # fmt: skip
+    monkeypatch.setattr(sampling, "end_covariance", lambda closed, total: np.eye(2) * 1e9)
+    total = 4
+    by_step, by_sample = sampling._backwards(closed, total)
+    assert (by_step.shape, by_sample.shape) == ((12, 2, 2), (4, 2, 2))
+
+    def end(step=None, sample=None):
+        x = np.zeros(4)
+        for k in range(total):
+            x = samples[k % 2] @ x
+            if sample is not None and sample[0] == k:
+                x = x + readings[k % 2][:, sample[1]]
+            for j, each in enumerate(steps):
+                x = each @ x
+                if step is not None and step[0] == 3 * k + j:
+                    x = x + noise[:, step[1]]
+        return error @ x[:3]
+
+    for source in (0, 1):
+        for at in range(12):
+            np.testing.assert_allclose(by_step[at, source], end(step=(at, source)), rtol=1e-9, atol=1e-12)
+        for at in range(4):
+            np.testing.assert_allclose(by_sample[at, source], end(sample=(at, source)), rtol=1e-9, atol=1e-12)
+    found = float(np.sum(by_step[9:] ** 2) + np.sum(by_sample[3:] ** 2))
+    kept = found / sampling.KEPT_VARIANCE / 2.0
+    for covariance, length in ((kept * 0.999999, 1), (kept * 1.000001, 2)):
+        monkeypatch.setattr(sampling, "end_covariance", lambda closed, total, c=covariance: np.eye(2) * c)
+        short = sampling._backwards(closed, total)
+        assert [len(each) for each in short] == [3 * length, length]
+        np.testing.assert_array_equal(short[0], by_step[-3 * length :])

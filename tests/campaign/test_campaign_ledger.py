@@ -1401,3 +1401,55 @@ def test_a_chunk_is_no_trace_and_a_trace_no_chunk():
         ("trace", "chunk", lambda: chunk_format.unpack_chunk(chunk_format.pack_trace(TRACE))),
     ):
         assert said(unpacked).startswith(f"these bytes are a {given}, not a {wanted}: the worker runs another microrad")
+
+
+@pytest.mark.parametrize("write", [True, False])
+def test_a_connection_syncs_whatever_it_writes_trusts_no_schema_and_writes_only_where_asked(path, write):
+    filled(path, 2)
+    with closing(file.connected(path, write=write)) as connection:
+        settings = ("trusted_schema", "synchronous", "fullfsync", "query_only")
+        found = [connection.execute(f"PRAGMA {each}").fetchone()[0] for each in settings]
+        assert found == [0, 2, 1, int(not write)]
+        assert connection.isolation_level is None
+        if write:
+            assert connection.execute("DELETE FROM traces").rowcount == 1
+            return
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            connection.execute("DELETE FROM traces")
+
+
+@pytest.mark.parametrize("check", ["_check_format", "_check_schema"])
+def test_a_connection_to_what_is_refused_is_closed(path, monkeypatch, check):
+    filled(path, 1)
+    made, connect = [], sqlite3.connect
+
+    def connected(*given, **more):
+        made.append(connect(*given, **more))
+        return made[-1]
+
+    def refused(*given):
+        raise CampaignError("another")
+
+    monkeypatch.setattr(file.sqlite3, "connect", connected)
+    monkeypatch.setattr(file, check, refused)
+    assert said(file._opened, path, "mode=rw", write=False) == "another"
+    (connection,) = made
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        connection.execute("SELECT 1")
+
+
+@pytest.mark.parametrize(
+    ("error", "ours"),
+    [(ZeroDivisionError, True), (OverflowError, True), (AttributeError, True), (KeyError, True), (IndexError, True),
+     (RecursionError, True), (TypeError, True), (ValueError, True), (UnicodeDecodeError, True), (MemoryError, False),
+     (OSError, False), (RuntimeError, False), (KeyboardInterrupt, False)],
+)  # fmt: skip
+def test_whatever_bytes_of_a_stranger_raise_is_told_and_other_errors_are_their_own(error, ours):
+    raised = error("utf-8", b"\xff", 0, 1, "odd") if error is UnicodeDecodeError else error("odd")
+    with pytest.raises(CampaignError if ours else error) as told, chunk_format._ours("trace"):
+        raise raised
+    if ours:
+        assert str(told.value) == "a trace is laid out as microrad never does: leave its file alone"
+        assert told.value.__cause__ is raised
+    else:
+        assert told.value is raised

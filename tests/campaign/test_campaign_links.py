@@ -767,3 +767,22 @@ def test_a_bundle_keeps_its_files_apart_in_the_folders_that_they_come_from(tmp_p
     assert (found.path.parent.name, found.sha256) == ("runs", campaign.sha256)
     assert found.mission.path.read_bytes() == own.read_bytes()
     assert bundle.mission_sha256(found) == bundle.mission_sha256(campaign)
+
+
+@pytest.mark.parametrize(
+    ("error", "ours"),
+    [(AttributeError, True), (KeyError, True), (IndexError, True), (RecursionError, True), (TypeError, True),
+     (ValueError, True), (MemoryError, False), (OSError, False), (KeyboardInterrupt, False)],
+)  # fmt: skip
+def test_a_bundle_that_is_none_of_ours_is_told_whatever_it_raises(monkeypatch, error, ours):
+    raised = error("odd")
+
+    def broken(spec):
+        raise raised
+
+    monkeypatch.setattr(bundle, "json", SimpleNamespace(loads=broken))
+    with pytest.raises(CampaignError if ours else error) as told:
+        bundle._unpacked(b"{}")
+    if ours:
+        assert str(told.value) == "the ledger holds a campaign as microrad never writes it: leave it alone"
+        assert told.value.__cause__ is raised

@@ -1899,3 +1899,64 @@ def test_traces_of_one_row_of_two_cells_have_each_the_value_of_their_own():
     made._traces()
     told = [(each.cell, each.row, each.output, each.value) for each in put]
     assert told == [(1, 3, "margin", -2.0), (1, 5, "margin", 4.0), (0, 5, "margin", 0.0), (0, 3, "margin", 1.0)]
+
+
+def test_a_row_by_itself_has_its_last_result_whether_its_worker_died_before_or_after(monkeypatch):
+    """Of one that had a result without numbers and then none at all, the result counts, and its reason."""
+    made, kept, told = a_runner(), [], {4: "dd", 5: "dn", 6: "fd", 7: "n"}
+
+    def outcomes(jobs):
+        for job in jobs:
+            now, told[job.row] = told[job.row][0], told[job.row][1:]
+            lost = (records.Failed(job.row, 7, 1, f"no number of {job.row}"),) if now == "f" else ()
+            value = np.nan if lost else 10.0 + job.row
+            chunk = replace(a_chunk(1, [job.row], [value], cell=1), failed=lost)
+            if now == "d":
+                yield Outcome(job, "died", reason=f"ended at {job.row}, {len(told[job.row])} to go")
+            else:
+                yield Outcome(job, "done", chunk_format.pack_chunk(chunk))
+
+    drawn = []
+    monkeypatch.setattr(run.sampling, "rows", lambda campaign, *of: (drawn.append(of), ({}, np.array([0.5])))[1])
+    made.campaign.outputs = [SimpleNamespace(name="margin")]
+    made._outcomes = outcomes
+    made._keep = lambda job, payload: kept.append(chunk_format.unpack_chunk(payload))
+    made._by_rows(records.Job(1, 1))
+    (chunk,) = kept
+    assert (chunk.cell, chunk.number, chunk.columns["row"].tolist()) == (1, 1, [4.0, 5.0, 6.0, 7.0])
+    np.testing.assert_array_equal(chunk.columns["margin"], [np.nan, 15.0, np.nan, 17.0])
+    assert chunk.columns["weight"].tolist() == [0.5, 1.0, 1.0, 1.0]
+    assert drawn == [(1, 4, 1)]
+    assert [(each.row, each.attempts, each.reason) for each in chunk.failed] == [
+        (4, 2, "ended at 4, 0 to go"), (6, 2, "no number of 6"),
+    ]  # fmt: skip
+    assert told == {4: "", 5: "", 6: "", 7: ""}
+
+
+@pytest.mark.parametrize("raised", [None, ValueError, KeyboardInterrupt])
+@pytest.mark.parametrize("broken", [False, True])
+def test_what_workers_left_is_swept_when_their_engine_is_closed_however_that_ends(monkeypatch, raised, broken):
+    """Also where the engine cannot be closed; the error of the work, or of the closing, comes out."""
+    done = []
+
+    class Engine:
+        def close(self):
+            done.append("close")
+            if broken:
+                raise OSError("no end")
+
+    monkeypatch.setattr(run, "sweep_scratch", done.append)
+    engine, error = Engine(), OSError if broken else raised
+
+    def used():
+        with run._closing(engine) as given:
+            assert (given is engine, done) == (True, [])
+            if raised is not None:
+                raise raised("stop")
+
+    if error is None:
+        used()
+    else:
+        with pytest.raises(error):
+            used()
+    assert done == ["close", "campaign"]
