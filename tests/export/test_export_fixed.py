@@ -991,3 +991,18 @@ def test_a_converter_without_a_limit_counts_as_far_as_a_word(low, high, ends):
     """A step of 2^-20 V is 0.78125 2^-13 counts of 10 mV."""
     of = SimpleNamespace(resolution_v=0.01, minimum_v=low, maximum_v=high)
     assert fixed_form._converter(of, 20) == fixed_form.Converter(838_860_800, 43, *ends)
+
+
+def test_integrators_that_rounding_moved_are_made_whole_in_a_copy_and_pairs_stay_as_they_are():
+    """One above 1 and one below it; a pair whose entries are as near to 1, and a slow pole."""
+    A = np.diag([1.0 + 3e-11, 1.0 - 3e-11, 1.0 - 3e-11, 1.0 - 4e-11, 1.0 - 1e-9])
+    A[1, 2] = 1e-6
+    given = A.copy()
+    zeros = np.zeros((5, 1))
+    form = fixed_point.Sections("modal", ((0, 1), (1, 2), (3, 1), (4, 1)), A, zeros, zeros.T, np.zeros((1, 1)), zeros)
+    found = fixed_point._with_integrators(form)
+    wanted = given.copy()
+    wanted[0, 0] = wanted[3, 3] = 1.0
+    np.testing.assert_array_equal(found.A, wanted)
+    np.testing.assert_array_equal(form.A, given)
+    assert (found.B is zeros, found.form, found.blocks) == (True, "modal", form.blocks)

@@ -1731,3 +1731,25 @@ def test_a_number_beyond_single_precision_is_refused_whichever_sign_it_has(sign)
         real(sign * 1e39, "single")
     assert float(real(sign * 1e39, "double")) == sign * 1e39
     assert float(real(sign * inf, "single").removesuffix("f")) == pytest.approx(sign * 3.4028235e38, rel=1e-6)
+
+
+def test_an_inverse_and_how_it_learns_are_the_arrays_of_the_kernel_at_the_period(monkeypatch):
+    asked = []
+    names = ("direct", "bouc_wen", "bouc_wen_actuator", "play_threshold", "play_weight", "play_actuator", "widening",
+             "lag_keep", "lag_weight", "lag_actuator")  # fmt: skip
+    inverse = {f"inverse_{name}": np.array([float(i)]) for i, name in enumerate(names)}
+    learns = {
+        "adaptive_weight": "weights", "adaptive_start": "starts", "adaptive": "settings",
+        "adaptive_threshold": "thresholds", "adaptive_more": "more",
+    }  # fmt: skip
+    monkeypatch.setattr(choice.control, "inverse_arrays", lambda *given: (asked.append(given), inverse)[1])
+    monkeypatch.setattr(choice.control, "adaptive_arrays", lambda *given: (asked.append(given), learns)[1])
+    for by_difference in (True, False):
+        found = choice.inverse_law("inverse", 0.125, by_difference)
+        assert [getattr(found, name).tolist() for name in names] == [[float(i)] for i in range(len(names))]
+        assert found.by_difference is by_difference
+    law = choice.adaptive_law("adaptation", 0.25)
+    assert (law.settings, law.threshold, law.weight, law.start) == ("settings", "thresholds", "weights", "starts")
+    assert asked == [("inverse", 0.125)] * 2 + [("adaptation", 0.25)]
+    assert choice.adaptive_law(None, 0.25) is None
+    assert len(asked) == 3

@@ -1,6 +1,7 @@
 """Linear models of a mission: files and objects carry the same numbers, and forms that hide something are refused."""
 
 import json
+import math
 import re
 import struct
 import sys
@@ -35,6 +36,7 @@ from microrad.export.matrices.models import (
     _controller,
     _coupled_models,
     _mirror_models,
+    _paper_models,
     _pointing_models,
     axis_plant,
 )
@@ -1265,3 +1267,111 @@ def test_forms_of_a_model_stand_in_cells_but_those_of_one_input_and_output(tmp_p
             assert record["p"][o, i].tolist() == [[-1.0 - i]] and record["num"][o, i][0, -1] == k[o, i]
     else:
         assert record["p"].tolist() == [[-1.0]] and record["num"][0, -1] == k.item()
+
+
+def test_numbers_of_a_matrix_are_whole_over_one_power_of_two_but_for_what_is_too_small_beside_the_largest():
+    """The largest is -4: what is below 2^-198 counts as nothing."""
+    matrix = np.array([[-4.0, 0.75, 2.0**-190], [2.0**-199, -(2.0**-197), 0.0]])
+    whole, power = matrix_forms._whole(matrix)
+    assert power == 197
+    assert whole.tolist() == [[-(2**199), 3 * 2**195, 2**7], [0, -1, 0]]
+    none, power = matrix_forms._whole(np.zeros((0, 3)))
+    assert (none.shape, power) == ((0, 3), 0)
+    plain, power = matrix_forms._whole(np.array([[3.0], [-640.0]]))
+    assert (plain.tolist(), power) == ([[3], [-640]], 0)
+
+
+def test_a_form_is_probed_a_decade_beyond_its_roots_or_up_to_half_the_rate():
+    """Roots at 0 have no frequency; without another, the band is about 1 Hz."""
+    roots = 2.0 * np.pi * np.array([0.0, -3.0, complex(40.0, 30.0), complex(40.0, -30.0), 0.5])
+    for found, low, high in ((roots, 0.05, 500.0), (roots[:1], 0.1, 10.0), (roots[:0], 0.1, 10.0)):
+        freq, s = matrix_forms._probes(found, 0.0)
+        assert (freq[0], freq[-1]) == (pytest.approx(low), pytest.approx(high))
+        np.testing.assert_allclose(s, 2j * np.pi * freq, rtol=1e-15)
+    freq, z = matrix_forms._probes(roots, 0.25)
+    assert (freq[0], freq[-1], freq.size) == (pytest.approx(4e-5), pytest.approx(2.0), s.size)
+    np.testing.assert_allclose(z, np.exp(0.5j * np.pi * freq), rtol=1e-12)
+    np.testing.assert_allclose(np.diff(np.log(freq)), math.log(5e4) / (freq.size - 1), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("response", "error", "at_hz"),
+    [
+        ([2.0, 2.25, -2.0, 2.5], 2.0, 7.0),
+        ([2.0, 1.0, 2.5, 2.0], 0.5, 4.0),
+        ([2.0, 2.0, 2.0, complex(2.0, 0.5)], 0.25, 9.0),
+        ([2.0, 2.5, 2.0, math.nan], math.inf, 9.0),
+        ([2.0, 2.5, math.inf, 9.0], math.inf, 7.0),
+        ([2.0, 2.0, 2.0, 2.0], 0.0, 1.0),
+    ],
+)
+def test_the_error_of_a_form_is_the_largest_share_that_its_response_is_off(response, error, at_hz):
+    gain = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.array([[2.0]]))
+    freq = np.array([1.0, 4.0, 7.0, 9.0])
+    found = matrix_forms._error(gain, np.array(response, dtype=complex), freq, 0.0)
+    assert found == (pytest.approx(error), at_hz)
+
+
+def test_a_balanced_model_has_the_same_response_with_rows_and_columns_of_like_sizes():
+    """Three states in units of their own, two inputs and three outputs."""
+    A = np.array([[-1.0, 0.5, 0.0], [0.25, -2.0, 0.75], [0.5, 0.0, -3.0]])
+    B, C = (
+        np.array([[1.0, 2.0], [0.5, 0.25], [1.5, 1.0]]),
+        np.array([[1.0, 0.5, 2.0], [0.0, 1.5, 1.0], [2.0, 1.0, 0.5]]),
+    )
+    units = np.array([1e-6, 1.0, 1e7])
+    given = lti.StateSpace(A / units[:, None] * units, B / units[:, None], C * units, np.zeros((3, 2)))
+    a, b, c = structure._balanced(given)
+    for s in (0.0, 2j, 1.0 - 1j):
+        wanted = C @ np.linalg.solve(s * np.eye(3) - A, B)
+        np.testing.assert_allclose(c @ np.linalg.solve(s * np.eye(3) - a, b), wanted, rtol=1e-9)
+    sizes = [np.linalg.norm(np.hstack([a, b]), axis=1), np.linalg.norm(np.vstack([a, c]), axis=0)]
+    assert np.max(sizes) < 8.0 * np.min(sizes)
+
+
+def test_models_of_the_paper_are_named_by_what_goes_in_and_comes_out(monkeypatch):
+    """The plant behind the drive, and the loop of the setup around the same mirror."""
+    asked = []
+    plant = lti.StateSpace(np.diag([0.5, 0.25]), np.ones((2, 1)), np.array([[1.0, 2.0]]), np.zeros((1, 1)))
+    loop = lti.StateSpace(np.diag([0.5, 0.25, 0.125]), np.ones((3, 1)), np.array([[3.0, 1.0, 2.0]]), np.ones((1, 1)))
+    monkeypatch.setattr(control, "sampled_plant", lambda *given: (asked.append(given), plant)[1])
+    monkeypatch.setattr(simulate, "sampled_loop", lambda *given: (asked.append(given), loop)[1])
+    timing = SimpleNamespace(period_s=0.25)
+    setup, origin = SimpleNamespace(timing=timing, drive="drive"), Origin("m", "0" * 64, "tip")
+    of = SimpleNamespace(setup=setup, mirror="mirror", source=SimpleNamespace(origin=origin))
+    found = _paper_models(of)
+    assert asked == [("mirror", "drive", timing), ("mirror", setup)]
+    assert [(each.name, each.period_s, each.origin, each.anti_windup) for each in found] == [
+        ("sampled_plant", 0.25, origin, None),
+        ("loop", 0.25, origin, None),
+    ]
+    ports = [[(p.name, p.unit) for p in (*each.inputs, *each.outputs, *each.states)] for each in found]
+    angle = ("line_of_sight_rad", "rad")
+    assert ports == [
+        [("command_v", "V"), angle, ("plant_state_0", "1"), ("plant_state_1", "1")],
+        [("error_rad", "rad"), angle, *((f"loop_state_{i}", "1") for i in range(3))],
+    ]
+    for each, wanted in zip(found, (plant, loop), strict=True):
+        for key in "ABCD":
+            np.testing.assert_array_equal(getattr(each.system, key), getattr(wanted, key))
+    assert [each.meaning for each in found] == [
+        "computation delay, amplifier and mirror, its hysteresis at its slow gain, at the control samples",
+        "loop transfer L, controller and sampled plant in series; the closed loop is L / (1 + L). An inverse acts on "
+        "the reference and is no part of it",
+    ]
+
+
+def test_json_of_two_models_has_its_words_as_they_are_in_their_order():
+    given = [
+        replace(two_by_two(), name="b", meaning='10 µrad \u2190 "V"'),
+        replace(two_by_two(), name="a", origin=None),
+    ]
+    text = matrices.json_text(given)
+    assert text.startswith('{\n "format": "microrad linear models",\n "version": 1,\n "microrad": "')
+    assert '"meaning": "10 µrad \u2190 \\"V\\""' in text and text.endswith("\n ]\n}\n")
+    first, second = json.loads(text)["models"]
+    assert [(each["name"], each["mission"] is None, each["mirror"] is None) for each in (first, second)] == [
+        ("b", False, False),
+        ("a", True, True),
+    ]
+    assert second["mission_sha256"] is None

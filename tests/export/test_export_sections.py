@@ -856,3 +856,60 @@ def test_a_pair_of_which_one_state_is_driven_or_shown_alone_is_left_whole(driven
     of = controller(rotation(TURN, 0.8), driven, shown)
     assert modes_module._stripped(modes(of), np.arange(2)).tolist() == [0, 1]
     assert minimal(of) is of
+
+
+@pytest.mark.parametrize(
+    ("A", "repeated"),
+    [
+        ([[1.0 - 2e-8, 0.5], [0.0, 1.0 - 2e-8]], 1.0 - 2e-8),
+        ([[1.0 - 3e-7, 0.5], [0.0, 1.0 - 3e-7]], None),
+        ([[1.0, 0.5], [0.0, -1.0]], None),
+        ([[0.5, 0.25, 0.0], [0.0, 1.0, 0.125], [0.0, 0.0, 1.0]], 1.0),
+        ([[1.0, 0.5, 0.0], [0.0, 1.0 - 1e-6, 0.5], [0.0, 0.0, 1.0 - 2e-6]], None),
+        ([[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1.0),
+    ],
+)
+def test_poles_repeat_on_the_circle_where_they_lie_as_near_to_it_as_to_each_other(A, repeated):
+    """Two of one size with unlike signs do not; of three alike, two that drive each other do."""
+    found = sections_module._defective(np.array(A), np.linalg.eigvals(np.array(A)).astype(complex))
+    assert found == (None if repeated is None else pytest.approx(repeated, rel=1e-12))
+
+
+def test_a_repeated_pair_on_the_circle_is_one_of_those_that_turn():
+    turn = np.array(rotation(0.5, 1.0))
+    chain = np.block([[turn, 0.25 * np.eye(2)], [np.zeros((2, 2)), turn]])
+    for A, repeated in ((chain, True), (np.kron(np.eye(2), turn), False)):
+        poles = np.repeat(np.exp([0.5j, -0.5j]), 2)
+        found = sections_module._defective(A, poles)
+        assert (found is not None) == repeated
+        if repeated:
+            assert found == pytest.approx(complex(math.cos(0.5), math.sin(0.5)))
+
+
+def test_what_stands_beside_and_below_blocks_is_taken_away_to_first_order_where_it_is_small():
+    """A block of one and one of two; what is too large for rounding is left, and what is kept is none of it."""
+    M = np.array([[0.5, 0.0, 3e-9], [7e-5, 0.25, 0.125], [0.0, 2e-9, -0.25]], dtype=np.longdouble)
+    kept = np.zeros((3, 3), dtype=bool)
+    kept[0, 0] = True
+    kept[1:, 1:] = [[True, True], [False, True]]
+    found = parting._correction(M, kept, (1, 2)).astype(float)
+    wanted = np.zeros((3, 3))
+    wanted[0, 1:] = np.linalg.solve((0.5 * np.eye(2) - M[1:, 1:].astype(float)).T, [0.0, -3e-9])
+    wanted[2, 1] = 2e-9 / 0.5
+    assert_allclose(found, wanted, rtol=1e-6, atol=1e-15)
+    kept[2, 1] = True
+    whole = parting._correction(M, kept, (1, 2)).astype(float)
+    wanted[2, 1] = 0.0
+    assert_allclose(whole, wanted, rtol=1e-6, atol=1e-15)
+
+
+def test_a_block_of_too_many_states_keeps_what_stands_below_it():
+    for size, found in ((30, 1e-9 / 0.5), (31, 0.0)):
+        M = np.diag(np.where(np.arange(size) % 2, 0.25, 0.75))
+        M[1, 0] = 1e-9
+        kept = np.ones((size, size), dtype=bool)
+        kept[1, 0] = False
+        X = parting._lowered(M, kept)
+        assert X[1, 0] == pytest.approx(found, rel=1e-9, abs=1e-30)
+        X[1, 0] = 0.0
+        assert not X.any()

@@ -13,6 +13,8 @@ from types import SimpleNamespace
 import control as python_control
 import numpy as np
 import pytest
+from pydantic import ValidationError
+from pydantic_core import PydanticCustomError
 from scipy.io import loadmat, savemat
 from scipy.signal import cont2discrete
 from scipy.sparse import csc_array
@@ -1129,3 +1131,101 @@ def test_each_matrix_that_is_too_small_or_too_large_is_named(tmp_path, key, shap
     with pytest.raises(ExportError) as refused:
         import_mat(path, GIVEN)
     assert f"model.mat: {key} has shape {shape}, where {wanted} fits the others" in str(refused.value)
+
+
+def test_what_a_mirror_file_is_refused_for_is_told_key_by_key_and_once_for_all_of_it():
+    one = PydanticCustomError("value_error", "Value error, poles lie together")
+    found = ValidationError.from_exception_data(
+        "Mirror",
+        [
+            {"type": one, "loc": ("linear", "poles", 2), "input": 1},
+            {"type": "missing", "loc": ("travel",), "input": {}},
+            {"type": PydanticCustomError("value_error", "a gain, Value error, or none"), "loc": (), "input": 1},
+        ],
+    )
+    assert mirror_file._reasons(found) == (
+        "linear.poles.2: poles lie together; travel: Field required; a gain, Value error, or none"
+    )
+    assert mirror_file._reasons(ValueError("Value error, as it is")) == "Value error, as it is"
+
+
+@pytest.mark.parametrize(("ends_hz", "period_s", "beyond"), [
+    (125.0, 0.004, ""), (125.5, 0.004, "125"), (0.5, 1.0, ""), (0.75, 1.0, "0.5"), (400.0, 2e-5, ""),
+])  # fmt: skip
+def test_a_band_may_end_at_half_the_rate_and_not_beyond(ends_hz, period_s, beyond):
+    given = replace(GIVEN, excited_from_hz=0.25, normalise_at_hz=0.25, excited_to_hz=ends_hz)
+    if not beyond:
+        mirror_file._check_band(given, period_s, "a source")
+        return
+    with pytest.raises(ExportError) as told:
+        mirror_file._check_band(given, period_s, "a source")
+    assert str(told.value) == (
+        f"a source: the band ends at {ends_hz:g} Hz, and a model that is sampled at Ts = {period_s:g} s says nothing "
+        f"beyond {beyond} Hz; give the band that it was identified in"
+    )
+
+
+@pytest.mark.parametrize(
+    ("there", "size", "why"),
+    [
+        (complex(3.0, -4.0), 5.0, ""),
+        (complex(0.0, 2.0), 2.0, ""),
+        (complex(0.0, -1e-300), 1e-300, ""),
+        (complex(-1e-9, 5.0), 0.0, "the output falls as the drive rises, the response at normalise_at (8 Hz) is -1"),
+        (0j, 0.0, "the model's response at normalise_at (8 Hz) is 0j, which cannot be divided out"),
+        (complex(math.inf, 0.0), 0.0, "the model's response at normalise_at (8 Hz) is (inf+0j), which cannot"),
+        (complex(math.nan, 1.0), 0.0, "the model's response at normalise_at (8 Hz) is (nan+1j), which cannot"),
+    ],
+)  # fmt: skip
+def test_a_gain_is_the_size_of_what_rises_with_the_drive(monkeypatch, there, size, why):
+    asked = []
+    monkeypatch.setattr(
+        mirror_file, "response", lambda model, freq: (asked.append((model, freq.tolist())), np.array([there]))[1]
+    )
+    given = replace(GIVEN, normalise_at_hz=8.0)
+    if why:
+        with pytest.raises(ExportError) as told:
+            mirror_file._gain("model", given, "a source")
+        assert str(told.value).startswith(f"a source: {why}")
+    else:
+        assert mirror_file._gain("model", given, "a source") == pytest.approx(size)
+    assert asked == [("model", [8.0])]
+
+
+@pytest.mark.parametrize(("dt", "period_s"), [(0, 0.0), (1, 1.0), (1.0, 1.0), (0.25, 0.25), (None, None), (True, None)])
+def test_an_object_is_sampled_at_its_period_be_it_one_second(dt, period_s):
+    for system in (python_control.tf([0.5], [1.0, -0.5], dt), python_control.ss(0.5, 1.0, 0.5, 0.0, dt)):
+        if period_s is not None:
+            found = roots_module.roots_of_control(system, "a source")
+            assert (found.period_s, found.poles.tolist(), found.gain) == (period_s, [0.5], 0.5)
+            continue
+        with pytest.raises(ExportError) as told:
+            roots_module.roots_of_control(system, "a source")
+        assert str(told.value) == (
+            f"{system.name} has dt = {dt}: continuous, or sampled how fast? Give it dt = 0 or its period in s"
+        )
+
+
+@pytest.mark.parametrize("shape", [(0, 0), (1, 2), (2, 1)])
+def test_a_sample_time_is_one_number(shape):
+    fields = {"z": np.zeros((0, 1)), "p": np.array([[-2.0]]), "k": np.array([[3.0]]), "Ts": np.full(shape, 0.5)}
+    with pytest.raises(ExportError, match=r"^a source: sampled, Ts = nan s, which is no time; give the sample time"):
+        roots_module.roots_of_fields(fields, "a source")
+
+
+def test_as_many_states_and_powers_as_a_mirror_may_have_are_taken(monkeypatch):
+    monkeypatch.setattr(roots_module, "MOST_ORDER", 2)
+    ones = np.ones((2, 1))
+    two = lti.StateSpace(np.diag([-1.0, -2.0]), ones, ones.T, np.zeros((1, 1)))
+    found = roots_module.roots_of_states(two, 0.0, "a source")
+    assert (found.zeros.tolist(), sorted(found.poles.real.tolist()), found.gain) == ([-1.5], [-2.0, -1.0], 2.0)
+    powers = roots_module.roots_of_coefficients(np.array([0.0, 6.0]), np.array([0.0, 3.0, 9.0, 6.0]), "a source")
+    assert (powers.zeros.size, sorted(powers.poles.real.tolist()), powers.gain) == (0, [-2.0, -1.0], 2.0)
+    three = lti.StateSpace(np.diag([-1.0, -2.0, -3.0]), np.ones((3, 1)), np.ones((1, 3)), np.zeros((1, 1)))
+    for call, said in (
+        (lambda: roots_module.roots_of_states(three, 0.0, "a source"), "3 states"),
+        (lambda: roots_module.roots_of_coefficients(np.ones(1), np.ones(4), "a source"), "order 3"),
+    ):
+        with pytest.raises(ExportError) as told:
+            call()
+        assert str(told.value) == f"a source: {said}, and a mirror has at most 2; reduce the model (balred)"
