@@ -1321,3 +1321,10 @@ def test_a_guard_has_an_origin_for_each_host_and_none_to_spare(hosts, pages):
     with pytest.raises(ValueError, match="the guard needs hosts, their origins and a token"):
         Guard(Inner(), hosts, pages, TOKEN)
     assert Guard(Inner(), (HOST, HOST), (PAGE, PAGE), TOKEN).limits == Limits()
+
+
+def test_headers_of_a_proxy_are_left_out_however_they_are_written():
+    inner = Inner()
+    ask(guard(inner), **{"X_Forwarded_Prefix": "//evil.example", "FORWARDED": "for=1.2.3.4", "X_Forward": "no proxy"})
+    found = {name.lower() for name, _ in inner.scopes[0]["headers"]}
+    assert found == {b"host", b"cookie", b"x-forward"}

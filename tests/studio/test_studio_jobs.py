@@ -1416,3 +1416,39 @@ def test_a_job_prints_as_the_pages_read_it_whatever_the_user_has_set(monkeypatch
         "of the user",
         os.pathsep.join([str(Path("src").absolute()), str(Path("/there").absolute())]),
     )
+
+
+@pytest.mark.parametrize(
+    ("notes", "rate"),
+    [
+        (((0.0, 15, 100, "x"), (1.0, 10, 100, "x"), (3.0, 20, 100, "x")), 5.0),
+        (((0.0, 9, 100, "x"), (1.0, 10, 100, "x"), (4.0, 20, 100, "x")), 2.75),
+        (((0.0, 19, 100, "x"), (1.0, 12, 100, "x"), (2.0, 11, 100, "x"), (4.0, 20, 100, "x")), 4.5),
+    ],
+)
+def test_the_pace_of_what_began_anew_is_that_since_then_although_it_is_further_now(tmp_path, notes, rate):
+    assert progress_of(tmp_path, *notes).rate_1_s == pytest.approx(rate)
+
+
+def test_a_number_that_only_a_job_of_others_or_a_link_has_is_passed_over(studio, tmp_path):
+    written(studio.folder, 3, cwd=str(tmp_path))
+    assert studio._next_number() == 4
+    (studio.folder / "700").mkdir()  # without a description
+    assert studio._next_number() == 4
+    (studio.folder / "4").symlink_to("nowhere")
+    (studio.folder / "5").mkdir()
+    assert studio._next_number() == 6
+    (studio.folder / "last").write_text("699", "utf-8")
+    assert studio._next_number() == 701
+
+
+def test_only_a_job_that_runs_is_stopping_and_only_one_that_was_begun_has_progress(tmp_path):
+    folder = written(tmp_path / "jobs", 4, cwd=str(tmp_path))
+    (folder / "progress").write_text('{"at": 1, "done": 3, "total": 7, "what": "w"}\n', "utf-8")
+    queued = jobs_files.read_job(folder)
+    assert (queued.state, queued.progress, queued.cancelling) == ("queued", None, False)
+    (folder / "cancel").touch()
+    (folder / "started.json").write_text('{"at": "begun"}', "utf-8")
+    (folder / "exit.json").write_text('{"at": "over", "code": 0}', "utf-8")
+    done = jobs_files.read_job(folder)
+    assert (done.state, done.progress, done.cancelling) == ("done", jobs_files.Progress(3, 7, "w"), False)

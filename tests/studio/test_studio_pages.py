@@ -3211,3 +3211,226 @@ def test_a_slider_that_was_moved_goes_back_with_the_text_that_it_had(session, mo
     assert [name for name, _ in shown] == ["show", "show"]
     assert shown[0][1] == {"text": found.at(found.position + 5)}
     assert shown[1][1]["place"] == found.position and row.typed == found.typed
+
+
+def test_a_panel_of_a_ledger_without_rows_says_so_and_draws_nothing_of_before(session, tab, monkeypatch):
+    panel = runs_jobs.CampaignPanel(session, session.folder / "x.ledger")
+    drawn, found = [], [found_figures("a", "b")]
+    monkeypatch.setattr(panel._plot, "show", drawn.append)
+    monkeypatch.setattr(session.campaigns, "look", lambda path: SimpleNamespace(fault=""))
+    monkeypatch.setattr(runs_jobs, "figures", lambda live: found[0])
+    asyncio.run(panel._look())
+    before, found[0] = len(drawn), None
+    asyncio.run(panel._look())
+    assert (panel._rows.visible, panel._rows.text) == (True, "No row is in the ledger yet.")
+    panel._draw()
+    assert before > 0 and len(drawn) == before
+
+
+def test_results_of_a_job_that_ends_once_more_stand_there_once(session, cards):
+    for name in ("x.nc", "y.nc"):
+        (session.folder / name).touch()
+    lost = Job(1, session.folder, "lost", "study", "t", (), session.folder, ("x.nc", "y.nc"))
+    card = runs_jobs._Card(cards, lost)
+    for job in (lost, replace(lost, state="running"), replace(lost, state="done")):
+        shown(card, job)
+    assert texts(card.results) == ["Save x.nc", "Save y.nc"]
+
+
+def test_one_recording_beside_the_one_that_is_shown_is_read_at_each_look(bench):
+    put_in(bench, "a.csv", "b.csv", "c.csv", "d.csv")
+    asyncio.run(bench.take(bench.files["c"]))
+    read = []
+    for _ in range(4):
+        asyncio.run(bench.check())
+        read.append([name for name, _ in bench.read])
+    assert read == [["c.csv", *["a.csv", "b.csv", "d.csv"][:count]] for count in (1, 2, 3, 3)]
+
+
+def test_the_fault_of_the_recording_that_is_shown_stands_below_it_too(bench, monkeypatch):
+    put_in(bench, "a.csv", "b.csv")
+
+    def refuse(path, columns):
+        raise mirror.reading.ReadingError(f"{path.name}: odd")
+
+    monkeypatch.setattr(mirror.reading, "view", refuse)
+    asyncio.run(bench.take(bench.files["b"]))
+    asyncio.run(bench.look())
+    assert (bench.words.text, texts(bench.list).count("b.csv: odd")) == ("b.csv: odd", 1)
+    assert "a.csv: odd" not in texts(bench.list)
+
+
+def test_a_recording_that_is_turned_to_is_measured_at_once_and_its_channels_are_read_once(bench, monkeypatch):
+    listed = []
+    monkeypatch.setattr(mirror.reading, "list_channels", lambda path: listed.append(path.name) or CHANNELS)
+    put_in(bench, "a.csv", "b.csv", "c.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    assert (listed, [name for name, _ in bench.read]) == (["a.csv"], ["a.csv"])
+    for key in ("c", "b", "c"):
+        asyncio.run(bench.see(key))
+        assert (bench.read[-1][0], bench.form.seen) == (f"{key}.csv", key)
+    assert listed == ["a.csv", "c.csv", "b.csv"]
+
+
+def test_the_channels_of_a_recording_that_was_checked_are_known(bench):
+    """Its units are held against those of the form when the mirror is identified."""
+    bench.answers["b.csv"] = Listing((ChannelInfo("drive [mV]", "", 9), ChannelInfo("angle [mrad]", "", 9)), None, ())
+    put_in(bench, "a.csv", "b.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    assert [each.listing for each in bench.dropped()] == [CHANNELS, None]
+    asyncio.run(bench.check())
+    assert [each.listing for each in bench.dropped()] == [CHANNELS, bench.answers["b.csv"]]
+    assert bench.action() is None
+    assert "unit of the drive: the form says V and b.csv says mV" in bench.words.text
+
+
+def test_other_columns_that_are_chosen_are_measured_at_once(bench):
+    put_in(bench, "a.csv")
+    asyncio.run(bench.take(bench.files["a"]))
+    bench.filling = True
+    bench.fields["drive"].value, bench.fields["output"].value = 1, 0
+    bench.filling = False
+    asyncio.run(bench.typed())
+    assert [(columns.inputs, columns.outputs) for _, columns in bench.read] == [((0,), (1,)), ((1,), (0,))]
+
+
+def test_of_two_recordings_that_are_measured_the_one_that_was_turned_to_last_is_shown(bench, monkeypatch):
+    put_in(bench, "a.csv", "b.csv")
+    shows, begun, go_on = [], [], asyncio.Event()
+    monkeypatch.setattr(bench, "_show", lambda view, words: shows.append(words))
+
+    async def look_into(key, setting):
+        begun.append(key)
+        if key == "a":
+            await go_on.wait()
+        return None, f"about {key}"
+
+    monkeypatch.setattr(bench, "_look_into", look_into)
+
+    async def both():
+        bench.form = replace(bench.form, seen="a")
+        first = asyncio.create_task(bench._measured())
+        await asyncio.sleep(0)
+        bench.form = replace(bench.form, seen="b")
+        await bench._measured()
+        go_on.set()
+        await first
+
+    asyncio.run(both())
+    assert (begun, shows) == (["a", "b"], ["about b"])
+
+
+def test_of_two_controllers_that_are_asked_for_the_later_one_is_shown_although_the_first_is_tuned_last(
+    session, controls, monkeypatch
+):
+    page = controls
+    asyncio.run(page.reload())
+    page.drawn.clear()
+    gate = asyncio.Event()
+
+    async def slow(element, work, *args):
+        if args[-1] == "PI":
+            await gate.wait()
+        return work(*args)
+
+    monkeypatch.setattr(control, "in_thread", slow)
+
+    async def both():
+        first = asyncio.create_task(page.show())
+        await asyncio.sleep(0)
+        page.filling = True  # no task for what is put in by hand
+        page.name.value = "PID"
+        page.filling = False
+        await page.show()
+        shown = list(page.drawn)
+        gate.set()
+        await first
+        return shown
+
+    shown = asyncio.run(both())
+    assert (shown[0], page.drawn, page.state.text) == ("PID", shown, "")
+
+
+def test_the_fault_of_what_is_tried_stands_beside_its_own_slider_until_it_is_right(session, board, monkeypatch):
+    board.board.show(link_view.sliders(session.draft))
+    beside = {}
+    for key, row in board.board.rows.items():
+        monkeypatch.setattr(row, "fault", lambda words, key=key: beside.update({key: words}))
+    asyncio.run(board._answer(Attempt(session.draft.set(LEO, "5 parsec"), None)))
+    assert "parsec" in beside.pop(LEO)
+    assert len(beside) > 1 and set(beside.values()) == {""}
+    asyncio.run(board._answer(Attempt(session.draft, 1)))
+    assert beside[LEO] == ""
+
+
+def test_a_slider_that_is_let_go_is_written_at_once_and_shown_behind_what_is_being_computed(
+    session, board, monkeypatch
+):
+    done = []
+
+    async def reload():
+        done.append("reload")
+
+    monkeypatch.setattr(board, "_reload", reload)
+    monkeypatch.setattr(board, "_mark", lambda: done.append("mark"))
+
+    async def let_go():
+        board._busy = True
+        task = asyncio.create_task(board._set(LEO, "6 cm"))
+        for _ in range(5):
+            await asyncio.sleep(0)
+        before = session.draft.values[LEO].typed, list(done)
+        board._busy = False
+        await task
+        return before
+
+    assert asyncio.run(let_go()) == ("6 cm", [])
+    assert done == ["mark", "reload"]
+
+
+def test_all_controllers_that_are_tuned_twice_at_once_are_tuned_for_the_second_time_alone(
+    session, controls, monkeypatch
+):
+    page = controls
+    asyncio.run(page.reload())
+    page.made.clear()
+    gate = asyncio.Event()
+
+    async def slow(element, work, *args):
+        await gate.wait()
+        return work(*args)
+
+    monkeypatch.setattr(control, "in_thread", slow)
+
+    async def twice():
+        first = asyncio.create_task(page.tune_all())
+        await asyncio.sleep(0)
+        second = asyncio.create_task(page.tune_all())
+        await asyncio.sleep(0)
+        gate.set()
+        await asyncio.gather(first, second)
+
+    asyncio.run(twice())
+    assert page.made == ["baseline", "baseline", "PI", "PID", "inverse"]
+    assert (page.tune.visible, page.stop.visible) == (True, False)
+
+
+def test_the_channels_of_a_recording_that_two_ask_for_at_once_are_read_once(bench, monkeypatch):
+    listed, gate = [], asyncio.Event()
+    put_in(bench, "a.csv", "b.csv")
+    monkeypatch.setattr(mirror.reading, "list_channels", lambda path: listed.append(path.name) or CHANNELS)
+
+    async def slow(element, work, *args):
+        await gate.wait()
+        return work(*args)
+
+    monkeypatch.setattr(mirror, "in_thread", slow)
+
+    async def three():
+        tasks = [asyncio.create_task(bench._listing(key)) for key in ("a", "a", "b")]
+        await asyncio.sleep(0)
+        gate.set()
+        return await asyncio.gather(*tasks)
+
+    assert asyncio.run(three()) == [CHANNELS] * 3
+    assert listed == ["a.csv", "b.csv"]

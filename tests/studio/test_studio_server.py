@@ -1108,3 +1108,29 @@ def test_a_file_that_cannot_be_looked_at_has_no_sign_and_any_other_one_its_own(f
     assert _sign(one) == _sign(one) != _sign(other)
     os.link(one, file.with_name("again.csv"))
     assert _sign(file.with_name("again.csv")) == _sign(one)
+
+
+def test_the_studios_folder_that_was_removed_is_private_again_for_either_note(file):
+    session = Session(file.parent, file)
+    for keep in (lambda: session.set(APERTURE, "6 cm"), lambda: setattr(session, "other", session.draft)):
+        shutil.rmtree(session.studio)
+        keep()
+        assert session.studio.stat().st_mode & 0o777 == 0o700
+
+
+def test_a_link_to_nowhere_in_the_place_of_what_git_is_to_overlook_is_left(file):
+    (file.parent / STUDIO).mkdir()
+    link = file.parent / STUDIO / ".gitignore"
+    link.symlink_to("nowhere")
+    Session(file.parent)
+    assert link.is_symlink() and link.readlink() == Path("nowhere")
+
+
+def test_a_file_that_others_change_behind_what_was_saved_is_read_anew_after_a_restart(file):
+    session = Session(file.parent, file)
+    session.set(APERTURE, "6 cm")
+    session.save()
+    file.write_text(file.read_text("utf-8").replace('leo_aperture = "6 cm"', 'leo_aperture = "8 cm"'), "utf-8")
+    again = Session(file.parent)
+    assert again.draft.values[APERTURE].typed == "8 cm"
+    assert (again.draft.changed, again.disk) == (False, "")

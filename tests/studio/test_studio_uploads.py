@@ -1,6 +1,7 @@
 """Recordings dropped into the studio: odd names, floods and bombs are refused in words, and the studio goes on."""
 
 import asyncio
+import errno
 import importlib
 import io
 import json
@@ -1426,3 +1427,31 @@ def test_a_path_outside_of_its_folder_or_none_at_all_is_told_with_the_folder(tmp
     assert str(refusal.value) == f"'../other/a.toml' is outside of {root}; choose a file in that folder"
     with pytest.raises(NameRefusedError, match=r"^'a.+b' is no path that can be opened: .*null"):
         within(root, "a\0b")
+
+
+def test_a_form_that_the_disk_does_not_take_is_told_in_the_words_that_there_are(tmp_path, monkeypatch):
+    drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
+    said, taken, faults = (
+        [],
+        [],
+        [OSError("the spool is odd"), OSError(errno.EACCES, "no way"), drop.ClientDisconnect()],
+    )
+
+    class Request:
+        async def form(self, **given):
+            raise faults.pop(0)
+
+    async def take(upload):
+        taken.append(upload)
+
+    async def send():
+        monkeypatch.setattr(drop, "_TURNS", asyncio.Semaphore(1))
+        return [(await field._take(Request())).status_code for _ in range(3)]
+
+    field = drop.Drop.__new__(drop.Drop)
+    field._uploads, field._refused, field._taken = Uploads(tmp_path / "uploads", LIMITS), said.append, take
+    assert (asyncio.run(send()), taken) == ([200] * 3, [])
+    assert said == [
+        f"the file could not be stored: {why}; check free space and permissions"
+        for why in ("the spool is odd", "no way")
+    ]
