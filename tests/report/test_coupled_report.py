@@ -1343,3 +1343,34 @@ def test_points_of_a_kind_are_joined_by_their_parameters_whatever_their_order_an
 def test_the_response_that_is_drawn_is_the_middle_one_of_those_that_there_are(known, drawn):
     responses = [SimpleNamespace() if k in known else None for k in range(6)]
     assert words.drawn_amplitude(SimpleNamespace(responses=responses)) == drawn
+
+
+@pytest.mark.parametrize(("count", "told"), [(5, (0, 2, 4)), (6, (0, 3, 5)), (7, (0, 3, 6)), (9, (0, 4, 8))])
+def test_of_more_than_four_amplitudes_the_first_the_middle_and_the_last_are_told(count, told):
+    said = words.by_amplitude(at_amplitudes(count))
+    drives = re.findall(r"at (\S+ m?V) rms drive", said)
+    every = [re.findall(r"at (\S+ m?V) rms drive", words.by_amplitude(at_amplitudes(k + 1)))[-1] for k in range(count)]
+    assert drives == [every[k] for k in told]
+
+
+@pytest.mark.parametrize(
+    ("held", "fitted", "said"),
+    [(1, 3, "r0; 3 other records were fitted"), (3, 1, "r0, r1 and r2; 1 other record was fitted")],
+)
+def test_records_that_were_fitted_are_one_or_several_however_many_are_held_out(found, held, fitted, said):
+    names = tuple(f"r{k}" for k in range(9))
+    assert words.rests_on(replace(found, held_out=names[:held], fitted=names[:fitted])) == f"This rests on {said}."
+
+
+def test_an_output_whose_floor_is_not_known_has_no_line_of_it_beside_one_whose_floor_is(found, monkeypatch):
+    shape = found.candidate().band_error_rms.shape
+    floor, noise = np.full(shape, 1e-7), np.full(shape, np.nan)
+    floor[1, :, 0], noise[0, 0, 1] = np.nan, 1e-8
+    monkeypatch.setattr(words, "band_floors", lambda found: (floor, noise))
+    names = [output.name for output in found.candidate().model.outputs]
+    assert [row[:2] for row in coupled_page._bands(found).rows] == [
+        *((f"100 mV, {names[0]}", what) for what in ("error", "best linear")),
+        *((f"100 mV, {names[1]}", what) for what in ("error", "best linear", "noise")),
+        (f"200 mV, {names[0]}", "error"),
+        *((f"200 mV, {names[1]}", what) for what in ("error", "best linear")),
+    ]

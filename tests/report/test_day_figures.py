@@ -1217,3 +1217,67 @@ def test_the_figures_of_a_day_stand_in_their_order_each_of_its_own_part(monkeypa
     ways = [("_optical_figure", day, optical)] if optical else []
     runs = [("_contact_run_figure", day, run)] if run else []
     assert figures.day_figures(day, run) == (first, ("along", day), *rest, *ways, *runs)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_along_a_contact_the_relay_is_seen_from_the_satellite_at_the_times_of_that_contact(monkeypatch, number):
+    day, asked = a_log_and_view(operations=SimpleNamespace(contact=SimpleNamespace(number=number))), []
+    day.view.pair.leo.orbit, day.view.pair.geo.orbit, day.data.table.wavelength_m = "low", "high", 1.55e-6
+    day.view.pair.epoch.utc = lambda at: f"2026-03-20T12:00:0{at:.0f}.123456Z"
+
+    def sight(*of):
+        asked.append(of)
+        drawn = {"range_m": "range", "point_ahead_rad": "ahead", "rate_rad_s": "rate"}
+        return SimpleNamespace(time_s=np.array([5.0, 7.0]), doppler_hz=lambda wavelength_m: wavelength_m, **drawn)
+
+    monkeypatch.setattr(figures.orbit, "sight", sight)
+    monkeypatch.setattr(figures, "times", lambda contact: ("times of", contact))
+    monkeypatch.setattr(figures, "along_contact", lambda *of, **named: (of, named))
+    (((since_s, *of), named),) = figures._along_figure(day)
+    assert asked == [("low", "high", ("times of", day.view.encounters[number - 1].contact))]
+    assert since_s.tolist() == [6.0 - number, 8.0 - number]
+    assert of == ["range", "ahead", "rate", 1.55e-6]
+    assert named == {"number": number, "rise_utc": f"2026-03-20 12:00:0{number - 1}"}
+
+
+def test_a_contact_in_time_is_drawn_from_its_first_state_to_its_last():
+    states = [("search", 120.0, 180.0), ("data", 180.0, 540.0), ("search", 540.0, 600.0)]
+    nothing = figures.Windows(NOTHING, NOTHING, NOTHING)
+    for panel in panels(figures.contact_run(states, nothing)):
+        assert (panel.x.low, panel.x.high) == (2.0, 10.0)
+
+
+def test_an_axis_of_latencies_begins_where_something_has_arrived():
+    none_yet = np.array([1.0, 100.0, 200.0]), np.array([0.0, 0.5, 1.0])
+    at_once = np.array([0.0, 400.0]), np.array([0.25, 1.0])
+    (panel,) = panels(figures.latency({"direct": none_yet, "relay": at_once}))
+    assert (panel.x.low, panel.x.high) == (50.0, pytest.approx(480.0, rel=1e-12))
+
+
+def test_what_moves_the_optical_downlink_stands_by_how_far_it_does_and_in_its_own_volume():
+    def swing(name, of_relay, of_optical, low_tb, high_tb):
+        at_low, at_high = (SimpleNamespace(optical_bit=8e12 * tb, relay_bit=1.0, ratio=1.0) for tb in (low_tb, high_tb))
+        ends = {"low": "-", "high": "+", "at_low": at_low, "at_high": at_high}
+        return SimpleNamespace(name=name, of_relay=of_relay, of_optical=of_optical, **ends)
+
+    moved = [swing("a", 9.0, 1.5, 1.0, 2.0), swing("b", 3.0, 1.0, 5.0, 5.0), swing("c", 1.0, 4.0, 0.5, 2.5)]
+    found = figures._optical_figure(SimpleNamespace(swings=moved), SimpleNamespace(capacity_bit=8e12))
+    assert (found.name, found.title) == (
+        "optical-assumptions",
+        "What the assumptions decide for the optical downlink",
+    )
+    assert {name: values.tolist() for name, values in found.columns.items()} == {
+        "as assumed": [1.0],
+        "c: - / +, lower": [0.5],
+        "a: - / +, lower": [1.0],
+        "c: - / +, higher": [2.5],
+        "a: - / +, higher": [2.0],
+    }
+    assert list(found.columns)[1:3] == ["c: - / +, lower", "a: - / +, lower"]
+
+
+def test_a_distribution_that_jumps_is_looked_at_just_before_the_jump():
+    at = SimpleNamespace(first_s=np.array([10.0]), last_s=np.array([10.0]), cdf=lambda t: (t >= 10.0).astype(float))
+    latency_s, share = figures._distribution(SimpleNamespace(latency=at))
+    assert (share[0], share[-1], latency_s[-1]) == (0.0, 1.0, 10.0)
+    assert 10.0 - 1e-7 < latency_s[0] < 10.0

@@ -1980,3 +1980,57 @@ def test_held_roots_have_a_damping_unless_they_are_real_and_fitted_ones_are_not_
     assert all(math.isnan(row.standard_error) for row in rows)
     fit.linear = None
     assert [(row.name, row.value, row.unit, row.note) for row in parameters._held(fit)] == lags
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        (-1.0, 0.123456, ("−1 V", "0.123 V")),
+        (-0.123456, 1.0, ("−0.123 V", "1 V")),
+        (0.0123456, 50.0, ("0.01 V", "50 V")),
+        (99.996, 100.00849, ("100 V", "100 V")),
+        (-7.23456, -0.0004, ("−7.235 V", "0 V")),
+    ],
+)
+def test_both_ends_of_a_drive_are_told_to_a_thousandth_of_the_range_between_them(low, high, said):
+    assert words.drive_range(SimpleNamespace(drive_min_v=low, drive_max_v=high)) == said
+
+
+def test_what_presses_has_neither_the_drives_nor_the_rates_that_the_verdict_has(monkeypatch):
+    monkeypatch.setattr(words, "warnings", lambda found, written: [*known, f"of {written}"])
+    found = SimpleNamespace(drive_min_v=-1.0, drive_max_v=3.0, rate_limit_v_per_s=500.0)
+    known = words.range_warnings((-1.0, 3.0), 500.0)
+    assert len(known) == 2 and words.pressing(found, "plays") == ["of plays"]
+    found.rate_limit_v_per_s = 400.0
+    assert words.pressing(found, "plays") == [known[1], "of plays"]
+
+
+def test_an_error_larger_than_its_frequency_ends_above_zero_on_the_logarithmic_axis():
+    linear = a_linear([-9.0 + 12.0j, -15.5 + 0j], [40.0, 2.0])
+    (panel,) = figures.poles(linear).sheet.panels
+    (line,) = panel.all_of(Line)
+    assert line.x == pytest.approx([15.0, 15.5])
+    np.testing.assert_allclose(line.x_arms, [[13.5, 2.0], [40.0, 2.0]])
+    np.testing.assert_allclose(line.y_arms, [[40.0 / 15.0, 0.0]] * 2)
+
+
+def test_a_drive_about_a_bias_has_as_many_swings_drawn_as_one_about_zero():
+    t = np.arange(3000) / 1000.0
+    drive = np.sin(2 * np.pi * 30 * t) + 0.5 * np.sin(2 * np.pi * 90 * t + 1.0)
+    plain, biased, below = (figures._stretch(shown_of(drive + bias), slice(500, 3000)) for bias in (0.0, 7.0, -7.0))
+    assert plain == biased == below and plain.stop == 3000 and 2200 < plain.start < 2500
+
+
+def test_a_chirp_crosses_the_middle_between_its_ends_and_a_spike_moves_that():
+    drive = chirp().drive[:, 0].copy()
+    assert figures.is_chirp(recording_from_arrays(drive, drive, RATE_HZ, "chirp"))
+    drive[drive.size // 2] += 4.0 * np.ptp(drive)
+    assert not figures.is_chirp(recording_from_arrays(drive, drive, RATE_HZ, "spike"))
+
+
+@pytest.mark.parametrize(("count", "rows", "columns"), [(1, 1, 1), (2, 1, 2), (3, 2, 2), (5, 3, 2)])
+def test_residuals_of_one_recording_have_the_whole_width_and_of_several_stand_two_by_two(count, rows, columns):
+    one = next(each for each in two_recordings() if each.prediction is not None)
+    sheet = figures.residuals([one] * count).sheet
+    assert (len(sheet.heights), len(sheet.widths), sheet.height) == (rows, columns, pytest.approx(0.5 + 1.9 * rows))
+    assert [(panel.row, panel.column) for panel in sheet.panels] == [divmod(k, columns) for k in range(count)]

@@ -1318,3 +1318,84 @@ def test_a_colour_bar_has_the_ticks_that_are_set_and_else_round_ones(ticks, show
     _, bar = axes_of(sheet).figure.axes
     assert bar.get_yticks().tolist() == shown and bar.get_ylabel() == "margin (dB)"
     pyplot.close("all")
+
+
+def test_of_given_axes_those_that_share_a_scale_with_the_first_or_the_last_have_no_title_of_it():
+    figure = pyplot.figure()
+    first = figure.add_subplot(131)
+    given = [first, figure.add_subplot(132, sharey=first), figure.add_subplot(133)]
+    sheet, panels = grid(6.0, 2.0, 1, 3, share_y=True)
+    for panel in panels:
+        panel.x, panel.y = Axis("x (s)"), Axis("y (m)")
+    axes_of(sheet, given)
+    assert [ax.get_ylabel() for ax in given] == ["y (m)", "", "y (m)"]
+    last = figure.add_subplot(236)
+    given = [figure.add_subplot(234), figure.add_subplot(235, sharex=last), last]
+    sheet, panels = grid(3.0, 6.0, 3, 1, share_x=True)
+    for panel in panels:
+        panel.x, panel.y = Axis("x (s)"), Axis("y (m)")
+    axes_of(sheet, given)
+    assert [ax.get_xlabel() for ax in given] == ["x (s)", "", "x (s)"]
+    pyplot.close("all")
+
+
+def test_a_logarithmic_axis_whose_ticks_are_set_has_none_between_and_a_linear_one_keeps_its_own():
+    sheet, (panel,) = grid(4.0, 3.0)
+    panel.add(Line(np.array([1.0, 90.0]), np.array([2.0, 80.0])))
+    panel.x, panel.y = Axis("x", log=True, ticks=(2.0, 30.0)), Axis("y", log=True)
+    ax = axes_of(sheet)
+    assert ax.get_xticks().tolist() == [2.0, 30.0] and not ax.get_xticks(minor=True).size
+    assert ax.get_yticks(minor=True).size
+    pyplot.close("all")
+
+
+@pytest.mark.parametrize(("size", "broken"), [((6.0, 1.6), False), ((1.6, 6.0), True)])
+def test_the_title_of_a_panel_is_broken_by_its_width_and_not_by_its_height(size, broken):
+    sheet, (panel,) = grid(*size)
+    panel.title = "a title of some thirty letters"
+    assert ("\n" in axes_of(sheet).get_title()) is broken
+    pyplot.close("all")
+
+
+def test_lines_of_a_title_that_is_broken_stay_apart():
+    wide = scales.width_of("a much longer second line", 9.0)
+    said = renderer._broken("one\na much longer second line", wide / 2.0, 9.0)
+    assert said == "one\na much longer\nsecond line"
+
+
+def test_the_region_between_levels_goes_on_beyond_the_last_one_to_infinity():
+    sheet, (panel,) = grid(4.0, 3.0)
+    x, z = np.arange(3.0), np.full((3, 3), np.inf)
+    z[0] = 0.5, 1.5, 2.5
+    panel.add(Field(x, x, z, 0.0, 3.0, levels=np.array([1.0, 2.0])))
+    ax = axes_of(sheet)
+    (contours,) = ax.collections
+    assert [bool(path.vertices.size) for path in contours.get_paths()] == [True, True, True]
+    assert contours.get_paths()[-1].vertices[:, 1].max() == 2.0
+    pyplot.close("all")
+
+
+def test_rings_of_two_points_are_left_out_beside_whole_ones():
+    sheet, (panel,) = grid(4.0, 3.0)
+    ring = np.array([[1.0, 1.0], [2.0, 1.0], [2.0, 3.0]])
+    panel.add(Area((ring[:2] + 7.0, ring), "#e69f00"))
+    ax = axes_of(sheet)
+    (patch,) = ax.patches
+    assert_array_equal(patch.get_path().vertices, [*ring.tolist(), ring[0]])
+    pyplot.close("all")
+
+
+def test_the_legend_of_a_sheet_on_given_axes_has_one_column_and_on_a_new_figure_as_many_as_it_asks_for():
+    for given, columns in ((False, 3), (True, 1)):
+        sheet, (panel,) = grid(7.0, 3.0)
+        panel.add(*(Line(np.arange(2.0), np.arange(2.0), label=label) for label in "abc"))
+        sheet.legend = Legend("above", 3)
+        ax = axes_of(sheet, pyplot.figure(figsize=(7.0, 3.0)).add_subplot() if given else None)
+        legend = ax.get_legend() if given else ax.figure.legends[0]
+        assert (legend._ncols, legend._loc == 0) == (columns, given)
+    pyplot.close("all")
+
+
+def test_an_empty_text_is_no_empty_sequence_of_results():
+    with pytest.raises(TypeError, match="plot_loops: cannot plot what is of type str; give one of these: HysteresisLo"):
+        plots.plot_loops("")

@@ -20,6 +20,7 @@ from microrad import report
 from microrad.core import folder, machine
 from microrad.link.budget.lines import FREE_SPACE_LOSS
 from microrad.link.requirement import Requirement
+from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
 from microrad.mirror import Variant
 from microrad.mission import file as missionfile
 from microrad.mission.model import Source
@@ -2091,3 +2092,224 @@ def test_the_sequence_names_both_divergences_the_point_ahead_where_there_is_one_
         communication=ns(data_rate_bit_s=2.5e9),
     )
     assert drawings._sequence(mission) == ["wide beacon, 750 µrad", "answer, 40 µrad", said, "lock; 2.5 Gbit/s"]
+
+
+def tracked(mirror, controller, freq_hz, k):
+    """A run of two axes whose steady part begins at its second sample, with numbers of its own."""
+    along = np.arange(4.0)
+    trace = ns(
+        steady=slice(1, 4),
+        time_s=0.25 + 1e-3 * along * k,
+        error_rad=1e-6 * np.stack([k + along, -100.0 - along], axis=1),
+        peak_rad=1e-6 * (k + 0.3),
+        rms_rad=1e-6 * (k + 0.2),
+        counts=ns(clamped=k, inverse_clamped=100 * k, saturated=k + 1, slew_limited=k + 2, alternating=k + 3),
+    )
+    return ns(mirror=mirror, controller=controller, freq_hz=freq_hz, trace=trace)
+
+
+def tracking_study(residual="radial"):
+    """A study with a run of either controller on each mirror at three frequencies."""
+    kinds = [(m, c) for m in (Variant.COMPARISON, Variant.STRAIGHT, Variant.GIVEN) for c in (PID_WITH_INVERSE, PID)]
+    runs = [tracked(*kind, f, 1 + 3 * n + k) for n, kind in enumerate(kinds) for k, f in enumerate((20.0, 1.5, 15.0))]
+    mission = ns(
+        scenario=ns(pid_frequencies_hz=(1.5, 15.0), inverse_frequencies_hz=(15.0, 20.0), amplitude_rad=2.5e-4),
+        requirement=ns(pointing_error_rad=1e-5),
+        conventions=ns(residual=residual),
+    )
+    return ns(file=ns(mission=mission), runs=runs)
+
+
+def test_errors_under_the_controller_are_drawn_on_the_mirror_and_on_one_without_hysteresis():
+    lines = figure_of(paper_figures.tracking_errors(tracking_study()))
+    assert lines[:3] == [
+        "fig6-pid",
+        "Fig. 6  PID with and without hysteresis",
+        "Tracking error of a 250 µrad sine under PID, on the mirror and on one of the same gain without hysteresis.",
+    ]
+    assert lines[3] == {
+        "time, with hysteresis, 1.5 Hz (s)": [0.0, 0.017, 0.034],
+        "error, with hysteresis, 1.5 Hz (rad)": [1.8e-5, 1.9e-5, 2e-5],
+        "time, without, 1.5 Hz (s)": [0.0, 0.011, 0.022],
+        "error, without, 1.5 Hz (rad)": [1.2e-5, 1.3e-5, 1.4e-5],
+        "time, with hysteresis, 15 Hz (s)": [0.0, 0.018, 0.036],
+        "error, with hysteresis, 15 Hz (rad)": [1.9e-5, 2e-5, 2.1e-5],
+        "time, without, 15 Hz (s)": [0.0, 0.012, 0.024],
+        "error, without, 15 Hz (rad)": [1.3e-5, 1.4e-5, 1.5e-5],
+    }
+    assert "\n".join(lines[4:]) == one_text("""
+Sheet width=7.8 height=3.5 widths=[1 1]
+Panel 0 0 x=<title=time, steady state (ms)> y=<title=pointing error (µrad)> title=1.5 Hz
+  legend=<place=above size=7.5>
+Line x=[0 17 34] y=[18 19 20] colour=#D55E00 dash=-- width=1.6 label=with hysteresis: peak 17.3,
+  rms 17.2 µrad
+Line x=[0 11 22] y=[12 13 14] colour=#0072B2 label=without: peak 11.3, rms 11.2 µrad
+Panel 0 1 x=<title=time, steady state (ms)> y=<title=pointing error (µrad)> title=15 Hz
+  legend=<place=above size=7.5>
+Line x=[0 18 36] y=[19 20 21] colour=#D55E00 dash=-- width=1.6 label=with hysteresis: peak 18.3,
+  rms 18.2 µrad
+Line x=[0 12 24] y=[13 14 15] colour=#0072B2 label=without: peak 12.3, rms 12.2 µrad
+""")
+
+
+def test_the_inverse_is_drawn_beside_the_controller_alone_with_the_limit_and_its_own_counts():
+    lines = figure_of(paper_figures.inverse(tracking_study()))
+    assert lines[:3] == [
+        "fig8-inverse",
+        "Fig. 8  PID against PID + inverse",
+        "Tracking error of a 250 µrad sine. The feedforward inverts the hysteresis model, driven by the reference and "
+        "its rate. Dotted: the required 10 µrad. Counts of PID + inverse: "
+        "20 Hz 1313 rate-clamped, 14 saturated, 15 slew-limited, 16 alternating; "
+        "1.5 Hz 1414 rate-clamped, 15 saturated, 16 slew-limited, 17 alternating; "
+        "15 Hz 1515 rate-clamped, 16 saturated, 17 slew-limited, 18 alternating.",
+    ]
+    assert list(lines[3]) == [
+        f"{what}, {label}, {f} Hz ({unit})"
+        for f in (15, 20)
+        for label in ("PID", "PID + inverse")
+        for what, unit in (("time", "s"), ("error", "rad"))
+    ]
+    assert "\n".join(lines[4:]) == one_text("""
+Sheet width=7.8 height=3.5 widths=[1 1]
+Panel 0 0 x=<title=time, steady state (ms)> y=<title=pointing error (µrad)> title=15 Hz
+  legend=<place=above size=7.5>
+Line x=[0 18 36] y=[19 20 21] colour=#D55E00 dash=-- width=1.6 label=PID: peak 18.3, rms 18.2
+  µrad
+Line x=[0 15 30] y=[16 17 18] colour=#0072B2 label=PID + inverse: peak 15.3, rms 15.2 µrad
+Rule at=-7.07107 upright=False dash=: width=0.9
+Rule at=7.07107 upright=False dash=: width=0.9
+Panel 0 1 x=<title=time, steady state (ms)> y=<title=pointing error (µrad)> title=20 Hz
+  legend=<place=above size=7.5>
+Line x=[0 16 32] y=[17 18 19] colour=#D55E00 dash=-- width=1.6 label=PID: peak 16.3, rms 16.2
+  µrad
+Line x=[0 13 26] y=[14 15 16] colour=#0072B2 label=PID + inverse: peak 13.3, rms 13.2 µrad
+Rule at=-7.07107 upright=False dash=: width=0.9
+Rule at=7.07107 upright=False dash=: width=0.9
+""")
+
+
+@pytest.mark.parametrize(("residual", "allowed"), [("radial", 7.0710678118654755), ("per axis", 10.0)])
+def test_both_models_of_hysteresis_are_drawn_each_with_its_own_inverse(residual, allowed):
+    found = paper_figures.comparison(tracking_study(residual))
+    assert (found.name, found.title) == ("comparison", "Hysteresis models compared")
+    assert "on the mirror as given and on the mission's comparison model, each with its own inverse" in found.caption
+    assert [panel.title for panel in found.sheet.panels] == ["15 Hz", "20 Hz"]
+    for panel, firsts in zip(found.sheet.panels, ((16.0, 4.0), (14.0, 2.0)), strict=True):
+        assert [(line.label.split(":")[0], round(float(line.y[0]), 9)) for line in panel.all_of(Line)] == [
+            ("mirror's model", firsts[0]),
+            ("comparison model", firsts[1]),
+        ]
+        assert [rule.at for rule in panel.all_of(Rule)] == pytest.approx([-allowed, allowed], rel=1e-9)
+    assert found.columns["error, comparison model, 20 Hz (rad)"] == pytest.approx([2e-6, 3e-6, 4e-6], rel=1e-9)
+
+
+def test_loops_of_three_frequencies_are_drawn_about_the_bias_with_their_widths():
+    drive, output, left = (np.array(each) for each in ([-1.0, 0.0, 1.0], [-2e-3, 5e-4, 2e-3], [-3e-6, 3e-5, 3e-6]))
+    loops = [
+        ns(freq_hz=f, drive_v=k * drive, output_rad=k * output, hysteresis_rad=k * left, width=0.1234 * k)
+        for k, f in enumerate((0.5, 80.0, 25.0), start=1)
+    ]
+    lines = figure_of(paper_figures.hysteresis_loops(ns(file=ns(mission=ns(mirror=ns(bias_v=6.0))), loops=loops)))
+    assert lines[:2] == ["fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis"]
+    assert lines[2].startswith("Settled loops of the hysteresis model alone, without the linear part.")
+    assert lines[3] == {
+        "drive at 0.5 Hz (V)": [5.0, 6.0, 7.0],
+        "output at 0.5 Hz (rad)": [-0.002, 0.0005, 0.002],
+        "hysteresis at 0.5 Hz (rad)": [-3e-6, 3e-5, 3e-6],
+        "drive at 80 Hz (V)": [4.0, 6.0, 8.0],
+        "output at 80 Hz (rad)": [-0.004, 0.001, 0.004],
+        "hysteresis at 80 Hz (rad)": [-6e-6, 6e-5, 6e-6],
+        "drive at 25 Hz (V)": [3.0, 6.0, 9.0],
+        "output at 25 Hz (rad)": [-0.006, 0.0015, 0.006],
+        "hysteresis at 25 Hz (rad)": [-9e-6, 9e-5, 9e-6],
+    }
+    assert "\n".join(lines[4:]) == one_text("""
+Sheet width=7.4 height=3.6 widths=[1 1]
+Panel 0 0 x=<title=drive (V)> y=<title=output about the bias (mrad)> legend=<title=drive>
+Line x=[5 6 7] y=[-2 0.5 2] label=0.5 Hz
+Line x=[4 6 8] y=[-4 1 4] colour=#0072B2 dash=-- label=80 Hz
+Line x=[3 6 9] y=[-6 1.5 6] colour=#009E73 dash=-. label=25 Hz
+Panel 0 1 x=<title=drive (V)> y=<title=hysteresis h (µrad)> legend=<place=below columns=2
+  title=loop width>
+Line x=[5 6 7] y=[-3 30 3] label=0.5 Hz: 12.34 %
+Line x=[4 6 8] y=[-6 60 6] colour=#0072B2 dash=-- label=80 Hz: 24.68 %
+Line x=[3 6 9] y=[-9 90 9] colour=#009E73 dash=-. label=25 Hz: 37.02 %
+""")
+
+
+def test_warnings_are_counted_over_all_groups_and_stand_below_what_each_puts_in_doubt(monkeypatch):
+    monkeypatch.setattr(words, "ranked_warnings", lambda study: {"The day": ["a", "b"], "The verdict": ["c"]})
+    view = words.warnings_view(None)
+    assert (view.title, view.anchor) == ("Warnings (3), the weightiest first", "warnings")
+    assert [each if isinstance(each, str) else list(each.lines) for each in view.blocks] == [
+        *("The day:", ["a", "b"]),
+        *("The verdict:", ["c"]),
+    ]
+    assert words.warnings(None) == ["a", "b", "c"]
+    monkeypatch.setattr(words, "ranked_warnings", lambda study: {})
+    view = words.warnings_view(None)
+    assert (view.title, list(view.blocks), words.warnings(None)) == ("Warnings", ["None."], [])
+
+
+def test_warnings_stand_by_doubt_then_a_missed_requirement_then_what_they_cost_then_the_requirement():
+    kept = Requirement("beacon", "beacon margin", "dB", 3.0, 4.0, 1.0, "width")
+    near, missed = replace(kept, subject="answer", margin=0.5), replace(kept, subject="stroke", actual=1.0, margin=-2.0)
+    made = ns(requirements=(kept, near, missed))
+    of = words.Warned
+    doubt = of("doubt", "verdict")
+    ranked = [
+        *(doubt, of("missed, 1 dB", "stroke", 1.0), of("missed", "stroke")),
+        *(of("2 dB", "", 2.0), of("1 dB", "beacon", 1.0), of("near", "answer"), of("far", "beacon"), of("nothing")),
+    ]
+    turned = ranked[::-1]
+    assert sorted(turned, key=lambda warned: words._weight(made, warned)) == ranked
+
+
+def test_each_warning_of_each_beam_is_about_its_requirement():
+    made = [("Answer", ["a", "b", "c"]), ("Communication", []), ("Beacon", ["d", "e"])]
+    budgets = [ns(name=name, warnings=said) for name, said in made]
+    found = words._of_links(ns(links=ns(budgets=budgets)))
+    assert [(each.text, each.about) for each in found] == [
+        *(("a", "answer"), ("b", "answer"), ("c", "answer")),
+        *(("d", "beacon"), ("e", "beacon")),
+    ]
+
+
+def test_a_way_to_the_partner_that_is_possible_has_a_probability_however_small():
+    def way(name, possible, probability, mean_s):
+        return ns(name=name, possible=possible, outcome=ns(success_probability=probability, mean_time_s=mean_s))
+
+    ways = [way("wide beacon", True, 0.0, 2.0), way("scan", False, 0.5, 3.0), way("other", True, 0.25, 4.0)]
+    of = ns(links=ns(finding=ns(ways=ways)), open_loop=ns(reading=ns(coverage=0.5)))
+    assert words.found(of).startswith(
+        "Acquisition, with its retries: the wide beacon locks with a probability of 0.0000, in 2 s on average; the "
+        "scan never locks; the other locks with a probability of 0.2500, in 4 s on average. The beacon's cone"
+    )
+
+
+def test_a_part_that_is_left_out_too_counts_by_what_it_adds_to_the_fine_loop():
+    parts = [ns(name="delay", rms_rad=3e-6), ns(name="OLYMPUS", rms_rad=1e-6)]
+    differences = [ns(name="delay", added_rad=2e-6), ns(name="hysteresis", added_rad=-1e-6)]
+    made = ns(fine_pointing=ns(budget=ns(parts=parts, differences=differences, full_rad=4e-6)))
+    assert [requirement_views._fine(made, cause) for cause in ("delay", "OLYMPUS", "hysteresis")] == [
+        "delay: 2 µrad of 4 µrad rms with hysteresis, 25 % of the sum of squares",
+        "vibration (OLYMPUS): 1 µrad of 4 µrad rms with hysteresis, 6.2 % of the sum of squares",
+        "hysteresis: −1 µrad of 4 µrad rms with hysteresis, 6.2 % of the sum of squares",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("case", "second"), [(None, "at the simulated residual"), (object(), "at the residual of the paper's loop")]
+)
+def test_the_budgets_of_a_study_stand_in_their_order_with_what_the_second_is_at(monkeypatch, case, second):
+    monkeypatch.setattr(page, "paired_tables", lambda one, other, names: [(one, other, *names)])
+    monkeypatch.setattr(page, "budget_table", lambda budget: f"table of {budget}")
+    monkeypatch.setattr(page, "_judged", lambda study: ["judged"])
+    monkeypatch.setattr(page, "_loop_noise", lambda study: ["noise"])
+    monkeypatch.setattr(page, "_implied", lambda study: "implied")
+    monkeypatch.setattr(page, "cost_view", lambda study: "cost")
+    monkeypatch.setattr(page, "budgets_view", lambda *given, warned: given[1:])
+    monkeypatch.setattr(page, "links_views", lambda links, figures, budgets, performance: (*budgets, performance))
+    made = ns(fine_case=case, communication="c", achieved="a", beacon="beacon", answer="answer", links="links")
+    tables = [("c", "a", "as budgeted", second), "table of beacon", "table of answer"]
+    assert page._links(made, ("figure",)) == (tables, ("figure",), ["judged", "noise"], "implied", "cost")

@@ -2696,3 +2696,72 @@ def test_a_bound_above_all_that_is_left_leaves_nothing_to_gain():
     found = words.room(loops_of(5.0, verified("PI", 2.0, 4.0), verified("LQG", 1.0, 6.0)))
     assert (found.at_baseline, found.at_nearest, found.with_hysteresis) == (0.0, 0.0, 0.0)
     assert (found.gained, found.holds) == (pytest.approx(-0.5), False)
+
+
+def test_a_sine_that_not_every_controller_ran_is_tracked_by_all_of_those_that_did():
+    def sine(controller, freq_hz, quantile_rad):
+        return ns(controller=controller, freq_hz=freq_hz, quantile_rad=quantile_rad, variant="given")
+
+    sines = [sine("PI", 1.0, 1e-6), sine("LQG", 1.0, 2e-6), sine("LQG", 2.0, 3e-6), sine("PI", 5.0, 9e-6)]
+    said = words.tracked(ns(sines=sines, verified=range(2)), 5e-6)
+    assert said.endswith(
+        "the requirement is met at 1 Hz by all controllers; at 2 Hz by all controllers; at 5 Hz by none (least: 9.00 "
+        "µrad, PI)."
+    )
+
+
+def test_a_rational_form_that_leaves_nothing_is_0_in_the_data_and_one_that_is_not_known_is_none():
+    errors = [
+        ns(index=ErrorIndex("MPE", 2.0), left={"a": 3e-6, "b": 4e-6}, before={"a": 6e-6, "b": 8e-6}, rational=value)
+        for value in (0.0, math.nan, 2e-6)
+    ]
+    found = windows.windows_data(errors)
+    assert [each["without_the_loop_rational_rad"] for each in found] == [0.0, None, 2e-6]
+    assert found[0]["left_rad"] == {"a": 3e-6, "b": 4e-6, "all": pytest.approx(5e-6)}
+    assert found[0]["without_the_loop_rad"]["all"] == pytest.approx(1e-5)
+
+
+def test_the_data_of_the_angle_of_arrival_are_those_of_the_first_axis():
+    def loop(*axes):
+        return ns(loop=ns(disturbances=axes))
+
+    def arriving(rms_rad):
+        return ns(name="angle of arrival", rms_rad=rms_rad, basis=f"of {rms_rad}", source="a paper")
+
+    other = ns(name="OLYMPUS", rms_rad=1.0, basis="b", source="c")
+    found = plain_data.arrival(loop((other, arriving(2e-6)), (arriving(3e-6),)))
+    assert found == {"angle_of_arrival": {"rms_rad": 2e-6, "basis": "of 2e-06", "source": "a paper"}}
+    assert plain_data.arrival(loop((other,), (arriving(3e-6),))) == {}
+
+
+def test_the_best_controller_is_drawn_before_an_inverse_in_series_and_each_has_a_look_of_its_own():
+    def controller(name, rms_rad, inverse=""):
+        return ns(design=ns(name=name, inverse=inverse), theory=ns(radial_rms_rad=rms_rad))
+
+    first, series, best, lowest = (
+        *(controller("PI", 9.0), controller("series", 8.0, "in series")),
+        *(controller("best", 7.0, "in the loop"), controller("lowest", 1.0)),
+    )
+    found = figures.shown(ns(verified=(first, series, best, lowest), best=best))
+    assert [each.name for each in found] == ["PI", "best", "series"]
+    assert [each.marker for each in found] == ["o", "s", "^"] and len({each.colour for each in found}) == 3
+    found = figures.shown(ns(verified=(first, best, lowest), best=first))
+    assert [each.name for each in found] == ["PI", "lowest", "best"]
+
+
+def test_margins_of_designs_are_named_behind_the_columns_that_stand_between():
+    cells = ("a", "0.50", "6.0", "40", "", "0.9", "10", "", "b")
+    _, table, _ = section.designs([("PI", "1", "2", *cells), ("LQG", "3", "4", *cells)], "", ("one", "two"), (1,))
+    headings = list(table.headings)
+    assert headings == [
+        *("controller", "one", "two", "tuned to", "modulus", "gain (dB)", "phase (°)", "disk", "bandwidth (Hz)"),
+        "bound by",
+    ]
+    assert {headings[place]: name for place, name in table.names.items()} == {
+        heading: f"controllers.margins.{name}"
+        for heading, name in (
+            *(("modulus", "modulus"), ("gain (dB)", "gain_up_db"), ("phase (°)", "phase_rad"), ("disk", "disk")),
+            ("bandwidth (Hz)", "bandwidth_hz"),
+        )
+    }
+    assert [headings[place] for place in table.words] == ["controller", "tuned to", "bound by"]

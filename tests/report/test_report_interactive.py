@@ -2334,3 +2334,86 @@ def test_the_legend_of_a_sheet_stands_in_the_middle_of_its_edge_or_at_the_end_of
     if place in ("above", "below"):
         assert own[0] == pytest.approx(own[2])
     assert all(key.x > p.outer[2] or key.y > p.outer[3] or key.y + key.height < p.outer[1] for p in found.placed)
+
+
+def test_of_panels_that_share_an_axis_the_lowest_of_each_column_has_its_texts():
+    sheet = Sheet(6.0, 4.0, (1.0, 1.0, 1.0), (1.0, 1.0), share_x=True)
+    places = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 1)]
+    for row, column in places:
+        sheet.panel(row, column).add(Line(X, Y))
+    shown = [place for place, each in zip(places, layout(sheet).placed, strict=True) if each.x_shown]
+    assert shown == [(1, 0), (2, 1)]
+
+
+def test_a_panel_over_two_columns_ends_where_the_last_of_them_does_whatever_stands_between_them():
+    sheet = Sheet(7.0, 4.0, (1.0, 1.0), (1.0, 2.0))
+    for panel in (sheet.panel(0, 0), sheet.panel(0, 1), sheet.panel(1, 0, 2)):
+        panel.add(Line(X, 1e4 * Y))
+        panel.y.title = "a title"
+    left, right, whole = (each.inner for each in layout(sheet).placed)
+    assert (whole[0], whole[2]) == pytest.approx((left[0], right[2]))
+    assert right[0] - left[2] > 20.0 and right[2] - right[0] == pytest.approx(2.0 * (left[2] - left[0]))
+
+
+def test_a_legend_is_as_wide_as_its_title_and_as_high_as_the_highest_entry_of_each_row():
+    sheet = one(*(Line(X, Y, label=label) for label in ("a", "b", "c\nd\ne")))
+    sheet.legend = Legend("above", 2, "a title that is much wider than any of the entries below it")
+    (key,) = layout(sheet).keys
+    assert (key.rows, key.width) == (2, pytest.approx(scales.width_of(sheet.legend.title, 8.0)))
+    assert key.height == pytest.approx(1.2 * 1.15 * 8.0 * (1 + 3 + 1))
+    sheet.legend = Legend("above", 2, "t")
+    (key,) = layout(sheet).keys
+    assert key.width == pytest.approx(sum(key.columns) + 14.0)
+
+
+def test_a_legend_of_a_sheet_without_a_place_stands_above():
+    sheet = one(Line(X, Y, label="a"))
+    found = []
+    for place in ("best", "above"):
+        sheet.legend = Legend(place)
+        laid = layout(sheet)
+        found.append((laid.keys[0].x, laid.keys[0].y, *laid.placed[0].inner))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(("low", "high", "ticks"), [(40.0, 47.0, range(40, 48)), (-9000.0, 5.0, None)])
+def test_a_colour_bar_has_ticks_from_its_lowest_value_on_and_room_for_the_widest(low, high, ticks):
+    sheet = one(Field(X, X, np.full((X.size, X.size), high), low, high, "margin (dB)"))
+    (placed,) = layout(sheet).placed
+    assert ticks is None or list(placed.bar_ticks) == [float(tick) for tick in ticks]
+    widest = max(scales.width_of("0" * len(text), 9.0) for text in placed.bar_ticks.values())
+    assert placed.outer[2] - placed.bar[2] > widest + 10.8
+
+
+def test_labels_that_differ_by_case_alone_are_two_entries_of_a_legend():
+    sheet = one(Line(X, Y, label="a"), Line(X, Y, label="A"), Line(X, Y, VERMILION, label="a"))
+    sheet.legend = Legend("above")
+    assert [each["label"] for each in plot_of(sheet)["keys"][0]["entries"]] == ["a", "A"]
+
+
+@pytest.mark.parametrize(
+    ("title", "spoken_", "panel", "said"),
+    [
+        ("t (dB)", "s (V)", "p (m)", "t: %{z:.5~g} dB"),
+        ("", "s (V)", "p (m)", "s: %{z:.5~g} V"),
+        ("", "", "p (m)", "p: %{z:.5~g} m"),
+    ],
+)
+def test_a_field_is_spoken_by_its_title_else_by_its_words_else_by_its_panel(title, spoken_, panel, said):
+    sheet = one(Field(X, X, np.ones((X.size, X.size)), 0.0, 2.0, title, spoken=spoken_))
+    sheet.panels[0].title = panel
+    assert said in plot_of(sheet)["data"][0]["hovertemplate"]
+
+
+def test_words_at_a_share_of_a_logarithmic_panel_stand_there_and_others_at_the_logarithm():
+    sheet = one(Line(np.array([1.0, 1e3]), np.array([1.0, 1e3])), Words("a", 0.0, 100.0, of_panel="x"))
+    sheet.panels[0].add(Words("b", 10.0, 0.25, of_panel="y"), Words("c", -1.0, 0.5, of_panel="y"))
+    sheet.panels[0].x.log = sheet.panels[0].y.log = True
+    found = [(each["text"], each["x"], each["y"]) for each in plot_of(sheet)["layout"]["annotations"]]
+    assert found == [("a", 0, 2), ("b", 1, 0.25)]
+
+
+@pytest.mark.parametrize(("opacity", "found"), [(0.0, "rgba(0,114,178,0)"), (0.5, "rgba(0,114,178,0.5)"), (1.0, BLUE)])
+def test_a_colour_is_clear_to_nothing(opacity, found):
+    assert interactive.clear(BLUE, opacity) == found
+    assert interactive.clear("", opacity) == ""

@@ -1,5 +1,6 @@
 """A report run again from the manifest that it carries: what differs, and what is refused."""
 
+import dataclasses
 import hashlib
 import json
 import math
@@ -1728,3 +1729,71 @@ def test_a_text_of_the_greatest_length_is_read_and_a_longer_one_is_told_with_its
 )
 def test_a_number_may_be_off_by_the_last_digit_of_that_which_was_written(was, now, near):
     assert compared._near_in_words(was, now) is near
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "line"),
+    [
+        (1.2345678, 1.2345679, "was 1.2345678 and is 1.2345679,"),
+        (1.23456789, 1.2345679, "was 1.23456789 and is 1.2345679,"),
+        (-123456.7, -123456.8, "was -123456.7 and is -123456.8,"),
+    ],
+)
+def test_two_numbers_that_differ_in_their_nine_digits_are_told_with_those(was, now, line):
+    assert line in str(compared.Difference("a", was, now, 1e-8))
+
+
+def test_rows_that_end_early_lack_cells_and_no_column():
+    found = compared.compare_tables("f", "a,b,c\n1,2\n3,4,5\n", "a,b,c\n1,2,6\n3\n", None)
+    assert [(each.place, each.was, each.now) for each in found.differences] == [
+        ("f: b, row 2", 4.0, ""),
+        ("f: c, row 1", "", 6.0),
+        ("f: c, row 2", 5.0, ""),
+    ]
+    assert found.numbers == 3
+
+
+@pytest.mark.parametrize("mirror", [{}, "", 0, False, []])
+def test_a_mirror_of_a_manifest_is_none_or_a_file_whatever_is_empty(tmp_path, mirror):
+    with pytest.raises(manifest_reader.ReproduceError, match="has no mirror with file, sha256, text, text_sha256: it"):
+        manifest_reader._check(tmp_path / "m.json", held(mirror=mirror))
+
+
+@pytest.mark.parametrize(("lengths", "many"), [((7, 7, 6), False), ((7, 7, 7), True), ((21,), True), ((20, 0), False)])
+def test_texts_of_named_files_are_bounded_together(tmp_path, monkeypatch, lengths, many):
+    monkeypatch.setattr(manifest_reader, "MOST_TEXT", 20)
+    texts = {str(k): "x" * length for k, length in enumerate(lengths)}
+    assert list(manifest_reader._texts_faults("inputs", texts)) == ["more inputs than a mission names"] * many
+    assert list(manifest_reader._texts_faults("versions", texts)) == []
+
+
+def test_mission_and_mirror_that_are_unpacked_have_each_its_own_hash(tmp_path, monkeypatch):
+    def entry(name, text, stated):
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        return {"file": name, "sha256": stated, "text": text, "text_sha256": digest}
+
+    @dataclasses.dataclass(frozen=True)
+    class Read:
+        sha256: str
+        mirror_file: object = None
+        mission: object = None
+
+    read = []
+    monkeypatch.setattr(manifest_reader.missionfile, "named_files", lambda mission: ())
+    monkeypatch.setattr(manifest_reader, "renamed", lambda mission, moved: mission)
+    load = lambda *places: read.append(places) or Read("own", Read("mirror's own"), "mission")  # noqa: E731
+    monkeypatch.setattr(manifest_reader.missionfile, "load_mission", load)
+    data = held(mission=entry("m.toml", "a = 1\n", "stated 1"), mirror=entry("n.toml", "b = 2\n", "stated 2"))
+    found, moved = manifest_reader.unpack_mission(manifest_reader.ReadManifest(tmp_path, data, ""), tmp_path / "in")
+    assert (found.sha256, found.mirror_file.sha256, moved) == ("stated 1", "stated 2", {})
+    ((mission, mirror),) = read
+    assert (mission.name, mission.read_text(), mirror.name, mirror.read_text()) == (
+        *("m.toml", "a = 1\n"),
+        *("n.toml", "b = 2\n"),
+    )
+
+
+def test_no_sign_of_markup_is_left_in_a_manifest_within_a_page_however_many_there_are():
+    given = {"a": "<b>&amp;</b> & <c>", "<&>": ["&&", ">>", "<<"]}
+    text = manifest.embedded(given)
+    assert not set("<>&") & set(text) and json.loads(text) == given

@@ -3900,3 +3900,68 @@ def test_what_is_not_as_at_the_release_is_told_of_all_checks_and_recordings_toge
 def test_the_concept_is_validated_by_as_many_measurements_as_published_outputs(measured, published):
     found = credibility.factors(dict.fromkeys(Status, 1), True, True, measured, published)
     assert [f.level for f in found if f.name == "Validation"] == [1]
+
+
+@pytest.mark.parametrize(("now", "moved"), [(-2.0, []), (-2.0 - 1e-9, []), (-2.0 - 4e-9, ["a"]), (-1.0, ["a"])])
+def test_a_number_below_zero_has_moved_as_one_above_it_has(now, moved):
+    assert list(dependences._moved({"a": -2.0}, {"a": now})) == moved
+
+
+def test_a_value_is_multiplied_under_its_whole_name_in_the_last_table_too_without_a_line_end():
+    given = '\n[a]\nfar_x = "5 m"\nx = "2 m"\n[b]\nx = "4 m"\n[c]\nlong_x = "7 s"\nx = "3 s"'
+    text = '\n[a]\nfar_x = "5 m"\nx = "4 m"\n[b]\nx = "4 m"\n[c]\nlong_x = "7 s"\nx = "9 s"'
+    assert sweeps.changed(given, {"a.x": 2.0, "c.x": 3.0}) == text
+    with pytest.raises(KeyError, match="long"):
+        sweeps.changed(given, {"a.long": 2.0})
+
+
+def test_what_is_behind_the_whole_periods_of_a_drive_excites_nothing():
+    """20 samples of a period of 8: half a wave is left, whose mean the whole periods do not have."""
+    record = SimpleNamespace(period_samples=8, rate_hz=24.0)
+    drive = 7.0 + np.sin(2.0 * np.pi * np.arange(20) / 8.0)
+    assert list(recorded._excited_hz(record, drive)) == pytest.approx([3.0, 3.0], rel=1e-12)
+
+
+def test_what_is_not_run_is_told_with_its_capital_letters():
+    outcomes = [check.Outcome(a_check(k, Referent.MEASUREMENT), (), absent=f"the {k}. file ABC.mat") for k in (3, 4)]
+    said = page.summary(findings.found(outcomes, unlike().integrity, False, {}))
+    assert said[3:] == ["Not run: c3. The 3. file ABC.mat.", "Not run: c4. The 4. file ABC.mat."]
+
+
+@pytest.mark.parametrize("heading", ["[x] # of a table", "[x]# [y]", "[ x]", "[[x]] #"])
+def test_a_heading_may_have_blanks_and_a_remark_behind_it(heading):
+    text = f"{heading}\nb = 1\n[y]\nb = 2"
+    assert workspace.with_values(text, {"x.b": "3"}) == f"{heading}\nb = 3  # example\n[y]\nb = 2\n"
+
+
+def test_a_compared_figure_has_the_unit_beside_it_and_else_that_of_its_name():
+    numbers = {"x_m.value": 2.0, "y_m.value": 3.0}
+    of = SimpleNamespace(numbers=lambda document: numbers, units={"run": {"x_m.value": "rad"}})
+    found = [
+        workspace.Workspace.compared(of, document, name, 1, 0.5, "why")
+        for document, name in (("run", "x_m.value"), ("run", "y_m.value"), ("budget", "x_m.value"), ("run", "z_s"))
+    ]
+    assert [each.unit for each in found] == ["rad", "m", "m", "s"]
+    assert [each.quantity for each in found] == ["run.x_m.value", "run.y_m.value", "budget.x_m.value", "run.z_s"]
+    assert [each.obtained for each in found[:3]] == [2.0, 3.0, 2.0] and math.isnan(found[3].obtained)
+    assert found[0].what == "x_m, value" and isinstance(found[0].expected, float) and not found[3].holds
+
+
+def test_a_requirement_that_is_missed_is_not_called_derived_from_what_it_may_rest_on():
+    missed = a_requirement("missed", actual=1.0, derived=("far = 1",))
+    met = a_requirement("met", derived=("a = 2", "b = 3"))
+    other = a_requirement("other", derived=("b = 3", "c = 4"))
+    said = report_requirements.derived_words([missed, met, other])
+    assert said == "Derived, so that meeting it proves nothing: a = 2; b = 3; c = 4."
+    assert report_requirements.derived_words([missed, a_requirement()]) == ""
+
+
+def test_the_jitter_that_is_advised_is_the_end_of_the_last_span_that_meets(monkeypatch):
+    spans = [SimpleNamespace(high=2e-6), SimpleNamespace(high=5.5559e-6)]
+    asked = []
+    solved = SimpleNamespace(solved=SimpleNamespace(intervals=spans))
+    monkeypatch.setattr(report_requirements.link_study, "solve_key", lambda *given: asked.append(given) or solved)
+    study = SimpleNamespace(file="the file")
+    r = a_requirement(actual=-20.0)
+    said = report_requirements._of_jitter(study, r)
+    assert said == "; to meet it, take jitter.rms = 5.55 µrad or less" and asked == [("the file", "jitter.rms")]
