@@ -3434,3 +3434,60 @@ def test_the_channels_of_a_recording_that_two_ask_for_at_once_are_read_once(benc
 
     assert asyncio.run(three()) == [CHANNELS] * 3
     assert listed == ["a.csv", "b.csv"]
+
+
+@pytest.mark.parametrize("back", [False, True], ids=["another mission", "the one that is shown"])
+def test_names_of_a_mission_that_has_changed_again_are_dropped(session, controls, monkeypatch, back):
+    gate = asyncio.Event()
+
+    async def first_late(element, work, *args):
+        if work is control._names and not gate.is_set():
+            gate.set()
+            for _ in range(20):
+                await asyncio.sleep(0)
+        return work(*args)
+
+    async def changed_twice():
+        older = asyncio.create_task(controls.reload())
+        await gate.wait()
+        session.set(LEO, typed)
+        await controls.reload()
+        await older
+
+    asyncio.run(controls.reload())
+    key, shown = controls.key, controls.file
+    session.set(LEO, "6 cm")
+    typed = "5 cm" if back else "7 cm"
+    monkeypatch.setattr(control, "in_thread", first_late)
+    asyncio.run(changed_twice())
+    assert controls.key == session.key
+    assert (controls.file == shown, controls.key == key) == (back, back)
+    assert controls.file == session.mission()
+
+
+def test_fits_of_the_identification_that_was_shown_before_are_not_those_of_another_one(session, job_view, monkeypatch):
+    view, reads = job_view, asyncio.Event()
+    view.jobs = [identified(session.folder, 2), identified(session.folder, 1)]
+    view.read = {"1": fits("a1", "b1"), "2": fits("a2", "b2")}
+
+    async def in_turn(element, work, *args):
+        found = work(*args)
+        if not reads.is_set():
+            reads.set()
+            while view.number == 1:
+                await asyncio.sleep(0)
+        else:
+            for _ in range(20):
+                await asyncio.sleep(0)
+        return found
+
+    async def chosen_meanwhile():
+        timer = asyncio.create_task(view.look())
+        await reads.wait()
+        await view.follow(2)
+        await timer
+
+    asyncio.run(view.follow(1))
+    monkeypatch.setattr(mirror_job, "in_thread", in_turn)
+    asyncio.run(chosen_meanwhile())
+    assert (view.number, [fit.model for fit in view.fits]) == (2, ["a2", "b2"])

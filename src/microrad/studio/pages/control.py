@@ -48,6 +48,7 @@ class ControlPage:
         """Build the body, and have it follow the session."""
         self.session = session
         self.file: MissionFile | None = None
+        self.asked: MissionFile | None = None
         self.key = ""
         self.question, self.round, self.filling = 0, 0, False
         self.found: dict[str, Controller | str] = {}
@@ -110,9 +111,14 @@ class ControlPage:
         stay(self.table)
         key, file = self.session.key, self.session.mission()
         self.words.text = self.session.faults()
-        if file is None or (self.file is not None and key == self.key and file == self.file):
+        if file is None:
+            return
+        self.asked = file
+        if key == self.key and file == self.file:
             return
         names = await in_thread(self.table, _names, file.mission.fine_pointing)
+        if self.asked is not file:  # the mission has changed again
+            return
         self.file, self.key = file, key
         self.stop_all()
         self.found = dict.fromkeys(names, "not looked at yet")

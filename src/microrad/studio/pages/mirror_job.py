@@ -73,8 +73,9 @@ class JobView:
 
     async def look(self) -> None:
         """Read the jobs, and show what has changed."""
+        asked = self.number
         jobs, fits = await in_thread(self.end, self._read)
-        if not jobs:
+        if not jobs or self.number != asked:  # another one was chosen meanwhile, and is read by itself
             return
         found = next((job for job in jobs if job.number == self.number), jobs[0])
         self.number = found.number
