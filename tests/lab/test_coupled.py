@@ -1593,3 +1593,10 @@ def test_a_drive_makes_as_much_of_an_output_as_it_has_power_where_the_output_ans
     table = replace(table_of(gain, (1.0, 1.0)), drive_power=power)
     assert linear.strongest_drives(table) == [1, 0]
     assert linear.strongest_drives(replace(table, drive_power=power[::-1])) == [0, 1]
+
+
+def test_each_model_with_stiffness_begins_at_the_linear_one_of_its_own_order(monkeypatch):
+    _, one, given, _ = climbed(monkeypatch, LadderOptions((2,), (6, 4, 2, 8)))
+    assert [each[:2] for each in given[5:]] == [
+        ("hysteretic_stiffness", one.fits[f"coupled linear, order {n}"]) for n in (4, 6)
+    ]

@@ -1782,3 +1782,10 @@ def test_errors_are_judged_record_by_record_and_motions_are_the_largest_of_all(m
     rms, largest = fit_of._judged(search, 2e-4)
     np.testing.assert_allclose(rms, [np.sqrt(26 / 4), np.sqrt(18.0), 1.0])
     assert largest.tolist() == [4.0, 2.5] and asked == [(2e-4, 0.25)]
+
+
+@pytest.mark.parametrize("classes", [[0, 0, 0, 1], [0, 1, 1, 1], [0, 1, 1, 2]])
+def test_a_single_record_in_an_amplitude_leaves_no_error_of_others(classes):
+    unseen, moved = fit_of._other_records(SimpleNamespace(records=range(4)), np.zeros(2), classes)
+    np.testing.assert_array_equal(unseen, np.full(4, np.nan))
+    assert moved is None

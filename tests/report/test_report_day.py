@@ -1789,7 +1789,8 @@ def test_a_day_without_any_capacity_of_the_relay_leads_its_page_as_bad(monkeypat
     links = SimpleNamespace(file=SimpleNamespace(sources={"a": "b"}))
     day = SimpleNamespace(relay=SimpleNamespace(capacity_bit=capacity_bit))
     monkeypatch.setattr(day_page_module.words, "sentences", lambda of: ["headline", "more"])
-    monkeypatch.setattr(day_page_module, "day_view", lambda *given: given)
+    viewed = []
+    monkeypatch.setattr(day_page_module, "day_view", lambda *given: viewed.append(given))
     monkeypatch.setattr(day_page_module, "marked", lambda views, sources: [])
     monkeypatch.setattr("microrad.report.day.figures.day_figures", lambda of: ())
     monkeypatch.setattr("microrad.report.page.templates.inputs_view", lambda sources: "inputs")
@@ -1797,6 +1798,7 @@ def test_a_day_without_any_capacity_of_the_relay_leads_its_page_as_bad(monkeypat
     file, kind, (lead,), views = day_page_module.day_page(day, links)
     assert (file, kind, views) == (links.file, "contacts", ["inputs"])
     assert (lead.headline, lead.good) == ("headline", capacity_bit > 0.0)
+    assert viewed == [(day, ["more"], ())]  # the headline is not said again
 
 
 def test_the_view_of_a_rich_day_has_its_tables_and_opens_two_of_its_pictures():

@@ -3965,3 +3965,15 @@ def test_the_jitter_that_is_advised_is_the_end_of_the_last_span_that_meets(monke
     r = a_requirement(actual=-20.0)
     said = report_requirements._of_jitter(study, r)
     assert said == "; to meet it, take jitter.rms = 5.55 µrad or less" and asked == [("the file", "jitter.rms")]
+
+
+def test_what_records_were_made_of_is_expected_and_what_a_fit_gives_is_obtained(everything):
+    made = {"resonance": "resonance", "slow pole": "slow", "zeros": "zero", "slow gain": "gain"}
+    made |= {"damping, resonance": "damping", "damping, zeros": "zero damping"}
+    found = [c for o in everything.outcomes for c in o.comparisons if c.quantity.startswith("identify.linear.")]
+    told = [c for c in found if c.what in made]
+    assert {c.what for c in told} == {*made}
+    assert [c.expected for c in told] == [identified._TRUTH[made[c.what]] for c in told]
+    assert not any(c.obtained == c.expected for c in told)  # noise has moved each of them
+    (rest,) = (c for c in found if c.what == "error on a record that no fit has seen: its noise")
+    assert rest.expected == identified._NOISE_RAD != rest.obtained

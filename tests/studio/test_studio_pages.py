@@ -3491,3 +3491,10 @@ def test_fits_of_the_identification_that_was_shown_before_are_not_those_of_anoth
     monkeypatch.setattr(mirror_job, "in_thread", in_turn)
     asyncio.run(chosen_meanwhile())
     assert (view.number, [fit.model for fit in view.fits]) == (2, ["a2", "b2"])
+
+
+def test_what_another_tab_accepts_no_longer_is_accepted_here_no_longer(bench):
+    for accepted in (("drift", "dead"), ("dead",), ()):
+        mirror_form.keep_form(bench.path, Form(Setting(accept=accepted)))
+        asyncio.run(bench.look())
+        assert (bench.form.setting.accept, bench.fields["accept"].value) == (accepted, list(accepted))

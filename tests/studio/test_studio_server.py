@@ -1134,3 +1134,12 @@ def test_a_file_that_others_change_behind_what_was_saved_is_read_anew_after_a_re
     again = Session(file.parent)
     assert again.draft.values[APERTURE].typed == "8 cm"
     assert (again.draft.changed, again.disk) == (False, "")
+
+
+def test_the_folder_of_a_session_is_where_it_began_behind_a_change_of_directory(tmp_path, monkeypatch):
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path)
+    session = Session(Path("work"))
+    monkeypatch.chdir(tmp_path / "work")
+    assert (session.folder, session.studio) == (tmp_path / "work", tmp_path / "work" / STUDIO)
+    assert session.jobs.folder.is_relative_to(tmp_path / "work" / STUDIO)
