@@ -132,7 +132,9 @@ def test_last_digits_of_arrays_and_of_hysteresis_are_those_of_a_kind_of_processo
     (arrays, hysteresis), again = digits(), digits()
     assert again == (arrays, hysteresis)
     other_arrays, _ = digits(**_LESS_OF_NUMPY)
-    assert other_arrays != arrays and other_arrays == pytest.approx(arrays, rel=1e-14)
+    # numpy's exponential has another kind for vectors of 512 bits alone
+    assert (other_arrays != arrays) is bool(re.search("X86_V4|AVX512", machine.machine()["instruction sets"]))
+    assert other_arrays == pytest.approx(arrays, rel=1e-14)
     _, other_hysteresis = digits(**_LESS_OF_THE_COMPILER)
     assert other_hysteresis != hysteresis and other_hysteresis == pytest.approx(hysteresis, rel=1e-9, abs=1e-18)
 

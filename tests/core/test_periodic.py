@@ -26,12 +26,3 @@ def test_a_delay_is_later_by_its_share_of_a_sample_at_any_rate(rate_hz, delay_s,
     found = delayed(sines(13, np.arange(13)), rate_hz, delay_s, factor)
     assert_allclose(found, sines(13, np.arange(13 * factor) / factor - rate_hz * delay_s), rtol=0, atol=1e-12)
     assert found.flags.c_contiguous
-
-
-@pytest.mark.parametrize("factor", [1, 2, 3, 4])
-def test_samples_are_kept_even_with_a_line_at_half_of_their_rate(factor):
-    signals = np.array([[1.0, 1.0], [-1.0, 0.0], [1.0, 0.0], [-1.0, 3.0]])
-    fine = upsampled(signals, factor)
-    assert_allclose(fine[::factor], signals, rtol=0, atol=1e-12)
-    assert_allclose(fine[:, 0], np.cos(np.pi * np.arange(4 * factor) / factor), rtol=0, atol=1e-12)
-    assert_allclose(delayed(signals, 1.0, 1.0, factor)[::factor], signals[[3, 0, 1, 2]], rtol=0, atol=1e-12)

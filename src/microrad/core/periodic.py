@@ -15,8 +15,6 @@ def upsampled(signals: Floats, factor: int) -> Floats:
     if factor == 1:
         return signals
     spectrum = np.fft.rfft(signals, axis=0)
-    if signals.shape[0] % 2 == 0:
-        spectrum[-1] *= 0.5  # half of the rate, one line of theirs, is two at the higher rate
     return np.asarray(np.fft.irfft(spectrum, factor * signals.shape[0], axis=0) * factor)
 
 
