@@ -143,3 +143,17 @@ def test_lines_of_code_are_those_of_bodies(faults, tmp_path, monkeypatch):
         "microrad.link:C.g, 22: return (h(),",
         "microrad.link:C.g, 23: 4)",
     ]
+
+
+@pytest.mark.parametrize("given", [[], ["1", "2"], ["many"], ["1.5"]])
+def test_a_draw_without_one_seed_is_refused(faults, monkeypatch, capsys, given):
+    monkeypatch.setattr(sys, "argv", ["faults", "draw", *given])
+    with pytest.raises(SystemExit, match="2"):
+        faults.main()
+    assert capsys.readouterr().err.endswith("error: draw takes one seed, a whole number\n")
+
+
+def test_a_draw_is_printed_line_by_line(faults, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["faults", "draw", "7"])
+    assert faults.main() == 0
+    assert capsys.readouterr().out.splitlines() == faults.drawn(7)
