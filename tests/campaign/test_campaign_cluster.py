@@ -48,8 +48,12 @@ def workers_here(pid=None):
 
 
 def workers_there(engine):
-    """Identities of the workers of an engine's scheduler, each start a new one."""
-    return {each["id"] for each in engine._client.scheduler_info()["workers"].values()}
+    """Identities of the workers of an engine's scheduler, each start a new one.
+
+    The scheduler is asked, as what the client keeps of its answers is without workers for moments.
+    """
+    client = engine._client
+    return {each["id"] for each in client.sync(client.scheduler.identity, n_workers=-1)["workers"].values()}
 
 
 def chunks(*numbers):
@@ -141,7 +145,7 @@ def engine(there, stuck):
     """An engine on these workers, whose jobs do what the table by number says."""
     table = TABLE | {"107": f"endless_once {stuck}", "else": "slow"}
     one = DaskEngine(json.dumps(table).encode(), TARGET, there.address, late_s=LATE_S)
-    until(lambda: len(one._client.scheduler_info()["workers"]) == 2, "two workers")
+    until(lambda: len(workers_there(one)) == 2, "two workers")
     yield one
     one.close()
 

@@ -26,3 +26,14 @@ def test_a_delay_is_later_by_its_share_of_a_sample_at_any_rate(rate_hz, delay_s,
     found = delayed(sines(13, np.arange(13)), rate_hz, delay_s, factor)
     assert_allclose(found, sines(13, np.arange(13 * factor) / factor - rate_hz * delay_s), rtol=0, atol=1e-12)
     assert found.flags.c_contiguous
+
+
+@pytest.mark.parametrize("samples", [2, 4, 6])
+@pytest.mark.parametrize("factor", [2, 3, 4])
+def test_a_line_at_half_the_rate_keeps_its_samples_and_is_a_cosine_between(samples, factor):
+    alternating = np.column_stack([np.cos(np.pi * np.arange(samples)), 3 + np.arange(samples) ** 2.0])
+    fine = upsampled(alternating, factor)
+    assert_allclose(fine[:, 0], np.cos(np.pi * np.arange(samples * factor) / factor), rtol=0, atol=1e-12)
+    assert_allclose(fine[::factor], alternating, rtol=0, atol=1e-12)
+    late = delayed(alternating, 1.0, 1.0, factor)
+    assert_allclose(late[::factor], np.roll(alternating, 1, axis=0), rtol=0, atol=1e-12)

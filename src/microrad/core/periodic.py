@@ -15,6 +15,8 @@ def upsampled(signals: Floats, factor: int) -> Floats:
     if factor == 1:
         return signals
     spectrum = np.fft.rfft(signals, axis=0)
+    if signals.shape[0] % 2 == 0:
+        spectrum[-1] *= 0.5  # at the higher rate this line, at half of the lower one, has its conjugate beside it
     return np.asarray(np.fft.irfft(spectrum, factor * signals.shape[0], axis=0) * factor)
 
 
