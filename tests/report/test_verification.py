@@ -109,6 +109,7 @@ def test_every_number_that_a_command_prints_is_registered(path):
 @pytest.mark.promise("verification-5")
 def test_what_nobody_has_registered_is_named():
     assert registry.unregistered(["budget.budgets.Beacon.margin_db", "budget.fudge_factor"]) == ["budget.fudge_factor"]
+    assert registry.unregistered(["", "0", "1.2", "."]) == ["", "0", "1.2", "."]
 
 
 @pytest.mark.promise("verification-3")

@@ -76,7 +76,13 @@ def quantity_of(name: str) -> Quantity | None:
         name: As `workspace.flattened` gives it; places in lists and sums over them do not count.
     """
     parts = tuple(part for part in name.split(".") if not part.isdigit())
-    return next((q for q in quantities() if q.matches(parts)), None)
+    return next((q for q in _ending(parts[-1] if parts else "") if q.matches(parts)), None)
+
+
+@cache
+def _ending(last: str) -> tuple[Quantity, ...]:
+    """The quantities whose names may end in this part, in their order."""
+    return tuple(q for q in quantities() if any(fnmatchcase(last, name.rpartition(".")[2]) for name in q.names))
 
 
 _LINKS = ("budgets", "margin_db", "other_tornados")
