@@ -9,7 +9,7 @@ import pytest
 from microrad.link.acquisition.detection import Vibration, detection_times, gap_probability, simulate_scan
 from microrad.link.acquisition.scan import Detector, Raster, Search, Spiral, StepStare, highest_speed
 
-URAD = 1e-6
+URAD, ENDURANCE = 1e-6, pytest.mark.endurance
 SEARCH = Search(300 * URAD, 20 * URAD, 0.25, 0.995)
 LOOK_S = 1e-3
 SURE, DOUBTFUL = Detector(LOOK_S), Detector(LOOK_S, 0.6)
@@ -109,7 +109,14 @@ def test_counting_dwells_of_half_a_radius_as_looks_would_promise_too_much():
     assert per_crossing < 0.4 < per_position
 
 
-@pytest.mark.parametrize("scan", scans(SURE) + scans(DOUBTFUL), ids=name)
+@pytest.mark.parametrize(
+    "scan",
+    [
+        pytest.param(scan, marks=() if place in (0, 3, 4, 7, 8, 11) else ENDURANCE)  # each kind at either speed
+        for place, scan in enumerate(scans(SURE) + scans(DOUBTFUL))
+    ],
+    ids=name,
+)
 def test_closed_form_and_simulation_agree_without_vibration(scan):
     runs = simulate_scan(scan, 12_000, seed=6, samples=64 if hasattr(scan, "speed_rad_s") else 12)
     times = detection_times(scan)
@@ -125,15 +132,17 @@ def test_closed_form_and_simulation_agree_without_vibration(scan):
 
 
 @pytest.mark.promise("link-49")
-@pytest.mark.parametrize("rms", [3 * URAD, 10 * URAD])
 @pytest.mark.parametrize(
-    ("scan", "correlation_time_s", "samples"),
+    ("scan", "correlation_time_s", "samples", "rms"),
     [
-        (Spiral(SEARCH, SURE, SLOW), 0.05, 64),
-        (Raster(SEARCH, SURE, SLOW, 0.01), 0.05, 64),
-        (StepStare(SEARCH, SURE, 1.2 * LOOK_S, 300.0), 30.0, 4),
+        pytest.param(*scan, rms * URAD, id=f"{name}-{rms * URAD}", marks=() if wide is (rms == 10) else ENDURANCE)
+        for rms in (3, 10)
+        for name, wide, scan in (
+            ("spiral", False, (Spiral(SEARCH, SURE, SLOW), 0.05, 64)),
+            ("raster", True, (Raster(SEARCH, SURE, SLOW, 0.01), 0.05, 64)),
+            ("step-stare", False, (StepStare(SEARCH, SURE, 1.2 * LOOK_S, 300.0), 30.0, 4)),
+        )
     ],
-    ids=["spiral", "raster", "step-stare"],
 )
 def test_gaps_by_vibration_agree_with_the_simulation(scan, correlation_time_s, samples, rms):
     runs = simulate_scan(scan, 5000, 11, Vibration(rms, correlation_time_s), samples)
@@ -188,7 +197,7 @@ def test_a_swath_narrower_than_the_pitch_leaves_its_share_of_gaps():
 @pytest.mark.promise("link-49")
 def test_a_fast_vibration_breaks_what_the_closed_form_assumes():
     scan, rms = Spiral(SEARCH, SURE, 28 * URAD / LOOK_S), 4 * URAD
-    runs = simulate_scan(scan, 4000, 3, Vibration(rms, 5e-5), 200)
+    runs = simulate_scan(scan, 1500, 3, Vibration(rms, 5e-5), 200)
     assert 1 - runs.detected[covered(runs)].mean() > 1.5 * gap_probability(scan, rms)
 
 
@@ -216,7 +225,7 @@ def test_the_first_row_has_none_before_it():
     assert abs(seen.mean() - times.mean_s) <= NORMAL_99 * seen.std() / math.sqrt(seen.size)
 
 
-@pytest.mark.parametrize("detector", [SURE, DOUBTFUL], ids=name)
+@pytest.mark.parametrize("detector", [pytest.param(SURE, marks=ENDURANCE), DOUBTFUL], ids=name)
 def test_dwells_that_are_coarse_against_the_uncertainty(detector):
     search = Search(25 * URAD, 20 * URAD, 0.25, 0.8)
     scan = StepStare(search, detector, 3.2 * LOOK_S, LOOK_S)

@@ -95,12 +95,12 @@ SLOW, FAST = scintillation(1024, 30, 1), beam(1024, 4, 3)
     ("power", "snr_db", "span", "runs"),
     [
         (np.ones(1024), -0.4, 0, 1),
-        (SLOW, 2.5, 0, 2),
-        (SLOW, 2.3, 8, 2),  # below the fades
+        pytest.param(SLOW, 2.5, 0, 2, marks=pytest.mark.endurance),
+        pytest.param(SLOW, 2.3, 8, 2, marks=pytest.mark.endurance),  # below the fades
         (SLOW, 2.0, 32, 2),  # about as long as they are
-        (SLOW, 1.3, 256, 2),  # above them
+        pytest.param(SLOW, 1.3, 256, 2, marks=pytest.mark.endurance),  # above them
         (FAST, 0.3, 64, 1),
-        (FAST, 0.0, 1024, 2),
+        pytest.param(FAST, 0.0, 1024, 2, marks=pytest.mark.endurance),
     ],
 )
 def test_the_error_ratio_is_that_of_a_bit_true_simulation_over_the_same_series(power, snr_db, span, runs):
@@ -110,7 +110,11 @@ def test_the_error_ratio_is_that_of_a_bit_true_simulation_over_the_same_series(p
 @pytest.mark.promise("link-87")
 @pytest.mark.parametrize(
     ("power", "snr_db", "span"),
-    [(steps(1024, 0.4, 2), 0.0, 1024), (rayleigh(1024, 60, 2), 5.0, 100), (rayleigh(1024, 60, 2), 6.0, 30)],
+    [
+        pytest.param(steps(1024, 0.4, 2), 0.0, 1024, marks=pytest.mark.endurance),
+        pytest.param(rayleigh(1024, 60, 2), 5.0, 100, marks=pytest.mark.endurance),
+        (rayleigh(1024, 60, 2), 6.0, 30),
+    ],
 )
 def test_and_it_is_where_a_window_leaves_many_errors(power, snr_db, span):
     """There the mutual information counts: without it 0.3 dB would be missed."""
@@ -234,7 +238,7 @@ def test_constant_power_costs_nothing_and_fades_cost_less_the_longer_the_interle
     assert found.ratio.value < 1e-5
     assert (found.lost.value, found.fades.share) == (0.0, 0.0)
     assert np.allclose(found.curve.penalty_db, 0.0, atol=2e-3)
-    faded = coded_fading(linked(series_of(scintillation(1 << 15, 30, 7)), 64), 3.0, 1e-5)
+    faded = coded_fading(linked(series_of(scintillation(1 << 14, 30, 7)), 64), 3.0, 1e-5)
     costs = faded.curve.penalty_db
     assert faded.curve.span_s[0] == 0.0
     assert costs[0] > faded.penalty_db > costs[-1] > 0.3

@@ -10,10 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from link_files import data_with, link_file, received_with, written
+from link_files import data_with, received_with, written
+from link_files import link_file as whole_link
 from microrad import link, report
 from microrad.link.fade_series import CodedLink, FadeSeriesError, code, coded_fading, of_mission, read_fade_series
-from microrad.link.requirement import UNDER_FADES, of_links
+from microrad.link.requirement import UNDER_FADES, Requirement, of_links
 from microrad.link.study import run_link_study
 from microrad.mission.file import MissionError, named_files, with_contents
 from microrad.mission.model import Source
@@ -26,6 +27,7 @@ from microrad.studio.views import link as link_view
 from places import ROOT
 
 PERIOD_S, TARGET = 1e-4, 1e-6
+ALONE = dict.fromkeys(("beacon", "answer", "acquisition"))
 TABLE = {
     "series": "fades.csv",
     "unit": "linear",
@@ -35,6 +37,11 @@ TABLE = {
     "interleaver": "5 ms",
     "bit_error_ratio": TARGET,
 }
+
+
+def link_file(folder, *changes):
+    """The paper's communication link, without the beams and the search for the partner."""
+    return whole_link(folder, ALONE, *changes)
 
 
 def said(call, code, *args):
@@ -49,10 +56,10 @@ def fading(**others):
     return {"communication.fading": table}
 
 
-def fades(folder, deep=0.5):
+def fades(folder, deep=0.5, count=2000):
     """A file with fades of some milliseconds."""
-    time_s = PERIOD_S * np.arange(8000)
-    power = 1.0 + deep * np.sin(2.0 * math.pi * 30.0 * time_s) * np.cos(2.0 * math.pi * 1.5 * time_s)
+    time_s = PERIOD_S * np.arange(count)
+    power = 1.0 + deep * np.sin(2.0 * math.pi * 30.0 * time_s) * np.cos(2.0 * math.pi * 6.0 * time_s)
     rows = "".join(f"{t:.4f},{p:.9g}\n" for t, p in zip(time_s, power, strict=True))
     (folder / "fades.csv").write_text("time (s),power\n" + rows)
 
@@ -76,7 +83,7 @@ def test_the_study_has_what_the_series_makes_of_its_static_margin(tmp_path):
     own = coded_fading(CodedLink(code("ccsds-k7-1-2"), series, 300e6, "block", 5e-3), static, TARGET)
     found = study.fading
     assert (found.penalty_db, found.ratio, found.lost) == (own.penalty_db, own.ratio, own.lost)
-    assert (found.margin_db, found.target, found.span_s, found.words) == (static, TARGET, 5e-3, 160)
+    assert (found.margin_db, found.target, found.span_s, found.words) == (static, TARGET, 5e-3, 40)
     assert 0.5 < found.penalty_db < 3.0
     (judged,) = (each for each in of_links(study) if each.name == UNDER_FADES)
     assert judged.actual == static - found.penalty_db
@@ -95,7 +102,7 @@ def test_the_study_has_what_the_series_makes_of_its_static_margin(tmp_path):
 @pytest.mark.promise("link-86", "link-100")
 def test_terminal_csv_json_and_page_have_the_same_numbers(tmp_path, call):
     fades(tmp_path)
-    path = written(tmp_path, data_with(fading()))
+    path = written(tmp_path, data_with(ALONE | fading()))
     found = json.loads(said(call, 1, str(path), "--json"))["fading"]
     assert 0.0 <= found["bit_error_ratio_interval"][0] < found["bit_error_ratio"]
     assert found["bit_error_ratio"] < found["bit_error_ratio_interval"][1] < 1e-2
@@ -112,7 +119,7 @@ def test_terminal_csv_json_and_page_have_the_same_numbers(tmp_path, call):
     assert "What an interleaver brings" in page
     assert "Extra power that brings the mean bit error ratio back to 10\u207b\u2076 under fades.csv" in page
     assert cost_text(found["curve"]["penalty_db"][0]) in page
-    without = json.loads(said(call, 1, str(written(tmp_path, data_with({}))), "--json"))
+    without = json.loads(said(call, 0, str(written(tmp_path, data_with(ALONE))), "--json"))
     assert "fading" not in without
 
 
@@ -165,7 +172,7 @@ def test_report_and_studio_draw_the_same_curve(tmp_path, monkeypatch, faded):
 def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):
     fades(tmp_path)
     text = (tmp_path / "fades.csv").read_text().splitlines()
-    dark = [f"{line.split(',')[0]},0" if 3000 < k < 3200 else line for k, line in enumerate(text)]
+    dark = [f"{line.split(',')[0]},0" if 700 < k < 760 else line for k, line in enumerate(text)]
     (tmp_path / "fades.csv").write_text("\n".join(dark) + "\n")
     study = run_link_study(link_file(tmp_path, fading(interleaving="none", interleaver=None)))
     assert study.fading.penalty_db == math.inf
@@ -173,7 +180,17 @@ def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):
     (view,) = (each for each in links_views(study) if each.title == "Coded link under fades")
     assert "without an interleaver" in view.blocks[0]
     assert "the fades cost more than any power makes up for" in view.blocks[0]
-    assert json.loads(said(call, 1, str(tmp_path / "link.toml"), "--json"))["fading"]["penalty_db"] is None
+    answered = call("budget", str(tmp_path / "link.toml"), "--json")
+    assert json.loads(answered.out)["fading"]["penalty_db"] is None
+    assert answered.code == 1, "a margin that is infinitely short is missed"
+    assert [r.met for r in of_links(study) if r.name == UNDER_FADES] == [False]
+
+
+@pytest.mark.parametrize(
+    ("margin", "met"), [(-math.inf, False), (-1e-8, False), (-1e-10, True), (0.0, True), (math.inf, True)]
+)
+def test_rounding_makes_up_for_nothing_that_is_infinitely_short(margin, met):
+    assert Requirement("communication", UNDER_FADES, "dB", 3.0, 3.0 + margin, margin, "fades of the series").met is met
 
 
 @pytest.mark.promise("link-85", "link-87")
@@ -207,14 +224,14 @@ def test_a_table_that_does_not_fit_is_refused_with_its_line(tmp_path, changes, k
 def test_the_table_of_the_page_is_one_that_a_mission_takes(tmp_path):
     page = (ROOT / "docs" / "link.md").read_text(encoding="utf-8")
     (table,) = (each for each in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "communication.fading" in each)
-    power = 1.0 + 0.5 * np.sin(2.0 * math.pi * 30.0 * PERIOD_S * np.arange(8000))
+    power = 1.0 + 0.5 * np.sin(2.0 * math.pi * 30.0 * PERIOD_S * np.arange(2000))
     (tmp_path / "fades.csv").write_text("power\n" + "".join(f"{p:.9g}\n" for p in power))
     given = tomllib.loads(table)["communication"]["fading"]
     file = link_file(tmp_path, {"communication.fading": given})
     found = run_link_study(file).fading
-    assert (found.span_s, found.target, found.words) == (5e-3, 1e-6, 160)
+    assert (found.span_s, found.target, found.words) == (5e-3, 1e-6, 40)
     sliding = run_link_study(link_file(tmp_path, {"communication.fading": {**given, "interleaving": "convolutional"}}))
-    assert sliding.fading.words == 8000 - 50 + 1
+    assert sliding.fading.words == 2000 - 50 + 1
     unsaid = {key: value for key, value in given.items() if key != "sampling"}
     with pytest.raises(FadeSeriesError, match="does not say how fast it was sampled"):
         run_link_study(link_file(tmp_path, {"communication.fading": unsaid}))
@@ -260,7 +277,7 @@ def test_a_receiver_has_the_target_of_the_series(tmp_path):
     ],
 )
 def test_a_series_that_cannot_be_used_is_refused_with_the_line_that_names_it(tmp_path, call, others, words):
-    fades(tmp_path)
+    fades(tmp_path, count=8000)
     (tmp_path / "negative.csv").write_text("power (W)\n" + "1\n" * 300)
     file = link_file(tmp_path, fading(**others))
     line = file.sources["communication.fading.series"].line

@@ -184,7 +184,7 @@ def links(draw):
     return changes, draw(st.floats(0.0, 100e-6)), draw(st.floats(1e6, 7e8))
 
 
-@settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(links())
 def test_the_lines_add_up_to_the_margin_of_the_map(folder, drawn):
     changes, error, rate = drawn

@@ -218,7 +218,10 @@ def test_the_uncoded_penalty_is_infinite_where_no_power_makes_up_for_the_jitter_
     assert under(tmp_path, jittery((0, 0), (0, 0)), receiver)[0].uncoded_penalty_db == 0.0
 
 
-@pytest.mark.parametrize("name", RECEIVERS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.endurance if "heterodyne" in name else ()) for name in RECEIVERS],
+)
 def test_every_receiver_has_a_penalty_also_against_a_bright_background(tmp_path, name):
     background = {"background_power": "1 mW", "code_gain": "4 dB"}  # more, no code gains in so much light
     bright = background if "background_power" in RECEIVERS[name] else {}
@@ -283,8 +286,8 @@ def test_a_link_that_stands_still_with_an_uncorrected_point_ahead_is_that_of_the
     [
         ((0, 0), (2, 2), (1, 0)),
         ((0, 0), (1, 3), (0, 1)),
-        ((0, 0), (3, 1), (1, 0)),
-        ((3, -4), (2, 2), (0.6, -0.8)),
+        pytest.param((0, 0), (3, 1), (1, 0), marks=pytest.mark.endurance),
+        pytest.param((3, -4), (2, 2), (0.6, -0.8), marks=pytest.mark.endurance),
         ((3, -4), (1, 3), (0.6, -0.8)),
     ],
 )

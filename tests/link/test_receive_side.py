@@ -35,6 +35,12 @@ MULTI = {"into": "multi-mode fibre", "core_radius": "25 um", "numerical_aperture
 DETECTOR = {"into": "detector", "detector_radius": "10 um", "focal_length": "1 m"}
 
 
+@pytest.fixture(autouse=True)
+def _without_tornados(monkeypatch):
+    """Nothing here looks at them: they assemble each link once more for each of its inputs."""
+    monkeypatch.setattr(link_study, "tornados", lambda *args: ())
+
+
 def with_coupling(folder, table, *changes):
     return link_file(folder, NO_BEAMS, {"communication.coupling": table}, *changes)
 
@@ -105,18 +111,19 @@ def test_under_errors_at_random_the_margin_is_that_of_the_sum(tmp_path, changes)
     file = with_coupling(tmp_path, FIBRE | {"jitter": THEIRS}, *changes)
     data, outage = link.of(file.mission), file.mission.requirement.outage
     rng = np.random.default_rng(3)
-    count = 2_000_000
+    count = 600_000
     x, y = 1e-6 + 3e-6 * rng.standard_normal(count), 2e-6 * rng.standard_normal(count)
     sent = data.beam.fall.loss_db(np.hypot(x, y) if changes else np.full(count, 10e-6))
     u, v = 1e-6 * rng.standard_normal(count), 0.5e-6 + 0.6e-6 * rng.standard_normal(count)
     end = data.receiving.end
-    lost = sent + end.loss_db(u, v)
+    received = end.loss_db(u, v)
+    lost = sent + received
     on_axis = Exposure.stated(data).on_axis_db
     lines, budget = lines_of(file)
     sampled = float(np.quantile(lost, 1.0 - outage)) - float(end.loss_db(0.0))
     assert budget.margin_db == pytest.approx(on_axis - sampled, abs=0.03)
     assert link_performance.margin_db(data) == pytest.approx(budget.margin_db, abs=1e-6)
-    alone = float(np.quantile(end.loss_db(u, v), 1.0 - outage)) - float(end.loss_db(0.0))
+    alone = float(np.quantile(received, 1.0 - outage)) - float(end.loss_db(0.0))
     added = -lines["Receive pointing loss"].value
     assert 0.0 < added < alone - 0.05 if changes else added == pytest.approx(alone, abs=0.02)
     under = link_performance.performance_under_jitter(data)
@@ -140,11 +147,13 @@ def test_the_outage_and_the_margin_for_it_do_not_ask_how_fast_the_errors_come(tm
 
 @pytest.mark.promise("link-74")
 def test_the_largest_rate_and_a_solved_key_keep_the_margin_of_both_ends(tmp_path):
-    file = with_coupling(tmp_path, FIBRE | {"jitter": THEIRS}, JITTER)
+    """The receiver moves about x alone, whose distribution has a closed form: a search asks for it 250 times."""
+    moving = FIBRE | {"jitter": THEIRS | {"rms": ["1 urad", "0 urad"]}}
+    file = with_coupling(tmp_path, moving, JITTER)
     rate = link_study.run_link_study(file).largest_rate_bit_s
-    at = with_coupling(tmp_path, FIBRE | {"jitter": THEIRS}, JITTER, {"communication.data_rate": f"{rate!r} bit/s"})
+    at = with_coupling(tmp_path, moving, JITTER, {"communication.data_rate": f"{rate!r} bit/s"})
     assert link_study.run_link_study(at).communication.margin_db == pytest.approx(3.0, abs=1e-6)
-    spare = with_coupling(tmp_path, FIBRE | {"jitter": THEIRS}, JITTER, {"communication.data_rate": "150 Mbit/s"})
+    spare = with_coupling(tmp_path, moving, JITTER, {"communication.data_rate": "150 Mbit/s"})
     solved = link_study.solve_key(spare, "communication.coupling.jitter.rms")
     assert link_study.run_link_study(solved.file).communication.margin_db == pytest.approx(3.0, abs=1e-6)
     assert solved.solved.intervals[0].low_open and solved.value < 1e-5

@@ -97,10 +97,14 @@ CASES = {
     **{name: [received_with(name)] for name in RECEIVERS},
     "sky": [received_with("apd ook", background=SKY, background_power=None)],
 }
+MORE = ("homodyne qpsk", "heterodyne bpsk", "heterodyne qpsk", "preamplified ook", "counting ook", "pin ook")
+"""Receivers that are like another one in the gate."""
 
 
 @pytest.mark.promise("link-10")
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.endurance if name in MORE else ()) for name in CASES]
+)
 def test_every_swing_is_the_budget_with_one_key_changed(tmp_path, name):
     file = link_file(tmp_path, *CASES[name])
     found = of_communication(file).swings
@@ -198,7 +202,14 @@ def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
 
 @pytest.mark.promise("link-5", "link-10")
 @pytest.mark.parametrize(
-    "changes", [[], [PATTERN], [LEFT], [received_with("apd ook")]], ids=["w", "pattern", "ahead", "apd"]
+    "changes",
+    [
+        [],
+        pytest.param([PATTERN], marks=pytest.mark.endurance),
+        pytest.param([LEFT], marks=pytest.mark.endurance),
+        [received_with("apd ook")],
+    ],
+    ids=["w", "pattern", "ahead", "apd"],
 )
 def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
     file = link_file(tmp_path, JITTER, NO_BEAMS, *changes)

@@ -1,5 +1,6 @@
 """What is required of a mission's links: a line for each requirement, with its margin and what limits it."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -51,7 +52,8 @@ class Requirement:
     def met(self) -> bool:
         """Whether the requirement is met; a rate that was solved for meets it but for rounding."""
         size = max(abs(self.required), abs(self.actual), 1.0 if self.unit == "dB" else 0.0)
-        return self.margin >= -ROUNDING * size and not self.unknown
+        spared = ROUNDING * size if math.isfinite(size) else 0.0  # no rounding makes up for what is infinitely short
+        return self.margin >= -spared and not self.unknown
 
     @property
     def mark(self) -> str:
