@@ -34,6 +34,15 @@ TWO_TERMINALS = {"constellation.terminals": 2}
 FILED = {"constellation": BY_FILE, "orbit.leo": {"kind": "elements", "file": "a.tle", "object": "70001"}}
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _links_alone():
+    """Nothing here looks at the links' tornados, nor at how their partners find each other."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(link_study, "tornados", lambda *args: ())
+        patch.setattr(link_study, "find_partner", lambda *args: None)
+        yield
+
+
 def made(folder, *changes):
     """The terminals of a mission's constellation and what they share."""
     file = day_file(folder, *changes)
@@ -143,15 +152,15 @@ def test_a_link_that_closes_nowhere_has_no_opportunity(tmp_path):
 
 
 def test_twice_the_satellites_have_the_opportunities_of_both_halves(tmp_path):
-    big = {"constellation.satellites": 40, "constellation.planes": 4, **SIX_HOURS}
+    big = {"constellation.satellites": 16, "constellation.planes": 4, **SIX_HOURS}
     pair, own, relays = made(tmp_path, big)
     given = pair.earth, pair.epoch, pair.span_s
     whole = as_rows(opportunities(own, relays, *given))
     halves = []
-    for first in (0, 20):
-        halves += [(s + first, *row) for s, *row in as_rows(opportunities(own[first : first + 20], relays, *given))]
+    for first in (0, 8):
+        halves += [(s + first, *row) for s, *row in as_rows(opportunities(own[first : first + 8], relays, *given))]
     assert whole == sorted(halves, key=lambda row: (row[2], row[0], row[1]))
-    assert {row[0] for row in whole} == set(range(40))
+    assert {row[0] for row in whole} == set(range(16))
 
 
 def test_progress_counts_satellites_to_the_last(tmp_path):
@@ -321,7 +330,7 @@ def test_the_words_add_up(plan):
 
 
 def test_a_long_table_is_cut_and_says_so(tmp_path):
-    plan, _ = planned(tmp_path, {"orbit.duration": "1 h", "constellation.satellites": 45})
+    plan, _ = planned(tmp_path, {"orbit.duration": "20 min", "constellation.satellites": 45})
     text = plan_text(plan, 120)
     assert "The first 40 of 45 satellites; --csv has every session." in text
     assert " 3-10 " in text.replace("\n", " ")
@@ -353,7 +362,7 @@ def grounds_of(folder, *changes):
 
 def test_contacts_with_stations_are_their_passes_one_by_one(tmp_path):
     pair, own, relays, ground = grounds_of(tmp_path)
-    whole = (0.0, 86400.0)
+    whole = (0.0, 43200.0)
     rows = as_rows(opportunities(own, relays, pair.earth, pair.epoch, whole, stations=ground))
     count = 0
     for (k, satellite), (j, each) in itertools.product(enumerate(own), enumerate(ground, len(relays))):
@@ -361,7 +370,7 @@ def test_contacts_with_stations_are_their_passes_one_by_one(tmp_path):
         mine = [(start, end) for s, r, start, end in rows if (s, r) == (k, j)]
         np.testing.assert_allclose(np.reshape(mine, (-1, 2)), np.reshape(alone, (-1, 2)), rtol=0, atol=1e-6)
         count += len(mine)
-    assert count > 200
+    assert count > 100
     relays_alone = as_rows(opportunities(own, relays, pair.earth, pair.epoch, whole))
     assert relays_alone == [row for row in rows if row[1] < len(relays)]
 

@@ -12,17 +12,14 @@ from scipy.stats import multivariate_normal
 from microrad import link, orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.link import study as link_study
-from microrad.loop import control, controller_study
-from microrad.loop.controller_study import designs
-from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission import file as missionfile
 from microrad.orbit import constellation, files
 from microrad.orbit import day as day_study
-from microrad.orbit.day import flow, geometry
+from microrad.orbit.day import assumptions, flow, geometry
 from microrad.orbit.propagation import analytic, mean_elements
 from microrad.study import contact_run
 from places import ROOT
-from scenes import scene_of
+from shipped import whole_study
 
 PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")
 SAID = " ".join(re.sub(r"\n- | *<!-- promise: day-\d+ -->", " ", PAGE).split())
@@ -110,6 +107,14 @@ def view(replaced, folder):
     return seen
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _without_tornados():
+    """Nothing here looks at those of the links."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(link_study, "tornados", lambda *args: ())
+        yield
+
+
 @pytest.fixture(scope="module")
 def links():
     return link_study.run_link_study(missionfile.load_link(ROOT / "missions" / "paper.toml"))
@@ -117,7 +122,10 @@ def links():
 
 @pytest.fixture(scope="module")
 def day(links):
-    return day_study.run_day_study(links)
+    """The day of the shipped mission, without its assumptions changed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(day_study, "swings", lambda *given: ())
+        return day_study.run_day_study(links)
 
 
 def ends(seen):
@@ -146,7 +154,8 @@ def test_each_kind_of_orbit_comes_to_what_stands_below_it(view, table):
 
 
 @pytest.mark.promise("day-3")
-def test_the_commands_of_the_page_run(call, tmp_path):
+def test_the_commands_of_the_page_run(call, monkeypatch):
+    monkeypatch.setattr(day_study, "swings", lambda *given: ())
     commands = [line.split() for line in re.findall(r"(?m)^    microrad (.*?)(?: +#.*| > .*)?$", PAGE)]
     assert len(commands) == 4
     for command in commands[1], commands[3]:
@@ -252,10 +261,13 @@ def test_rates_share_and_store(replaced, links, day):
 
 @pytest.fixture(scope="module")
 def under_clouds(folder):
-    """The day of the shipped mission with the page's optical ground stations."""
+    """The day of the shipped mission with the page's optical ground stations, and of its assumptions that of clouds."""
+    every, clouds = assumptions._changes, "availability of the optical stations"
     text = TEXT[: TEXT.index("[constellation]")] + TEXT[TEXT.index("[mirror]") :] + "\n" + OPTICAL
     (folder / "clouds.toml").write_text(text, encoding="utf-8")
-    return day_study.run_day_study(link_study.run_link_study(missionfile.load_link(folder / "clouds.toml")))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assumptions, "_changes", lambda *args: [each for each in every(*args) if each[0] == clouds])
+        return day_study.run_day_study(link_study.run_link_study(missionfile.load_link(folder / "clouds.toml")))
 
 
 @pytest.mark.promise("day-44", "day-45", "day-52")
@@ -337,19 +349,16 @@ def test_the_papers_claim(links, day):
 # ------------------------------------------------------------------------------------------------ the simulated loop
 @pytest.fixture(scope="module")
 def lqg():
-    """The shipped mission's scene and its LQG, tuned as `microrad run` tunes it."""
-    file = missionfile.load_mission(ROOT / "missions" / "paper.toml")
-    scene, f = scene_of(file), file.mission.fine_pointing
-    wanted = control.Specification(f.modulus_margin)
-    tuned = control.tune(control.LQG, designs.plants(scene, f.seed), wanted, seed=f.seed)
-    return file.mission, scene, controller_study.Design("LQG", tuned, assemble("LQG", scene.loop, tuned.controller))
+    """The shipped mission, and what its whole study finds of its fine-pointing loop, whose best is LQG."""
+    found = whole_study()[0]
+    assert found.fine_pointing.best.design.name == "LQG"
+    return found.file.mission, found.fine_pointing
 
 
 @pytest.mark.promise("day-38")
 def test_what_the_simulated_loop_leaves(lqg, links, day):
-    m, scene, design = lqg
-    (verified,) = controller_study.verify(scene, (design,))
-    left = verified.simulated["given"].quantile_rad
+    m, fine = lqg
+    left = fine.best.simulated["given"].quantile_rad
     loss = float(link.of(links.file.mission).beam.fall.loss_db(left))
     told(f"{left * 1e6:.2f} µrad at 99.7 %, a pointing loss of {loss:.2f} dB in place of {day.loss.loss_db:.2f} dB")
     assert m.fine_pointing.quantile == 0.997 and f"loss_db={loss:.2f}" in PAGE
@@ -357,9 +366,8 @@ def test_what_the_simulated_loop_leaves(lqg, links, day):
 
 @pytest.mark.promise("day-27", "day-29")
 def test_one_contact_in_time(lqg, links, day):
-    m, scene, design = lqg
-    study = SimpleNamespace(scene=scene, best=SimpleNamespace(design=design))
-    run = contact_run.of_mission(m.operations, m.acquisition, links.data, day, links.finding, study)
+    m, fine = lqg
+    run = contact_run.of_mission(m.operations, m.acquisition, links.data, day, links.finding, fine)
     begins = run.contact.start_s - run.log[0].time_s
     told(f"the slew begins {begins:.0f} s before the rise, data {run.first_data_s - run.contact.start_s:.1f} s after")
     told(f"flow for {run.data_s / 60:.1f} min, {100 * run.data_share:.1f} % of the contact,")

@@ -33,7 +33,7 @@ from microrad.orbit.operations import (
 KM = 1e3
 GBIT = 1e9
 INF = math.inf
-properties = settings(deadline=None, derandomize=True, database=None, max_examples=150)
+properties = settings(deadline=None, derandomize=True, database=None, max_examples=60)
 one_millisecond = 1e-3
 rounding = 1e-9  # relative
 TABLE = RateTable((Step(2 * GBIT, 38_000 * KM), Step(1 * GBIT, 42_000 * KM)))

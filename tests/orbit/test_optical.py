@@ -215,26 +215,37 @@ def test_a_part_of_a_contact_carries_what_it_has_there():
 
 
 # -------------------------------------------------------------------------------------------------- the whole day, told
-def whole_day(folder, *changes):
-    return day_study.run_day_study(link_study.run_link_study(day_file(folder, ALONE, *changes)))
+ASKED = (
+    "availability of the optical stations",
+    "optical ground stations",
+    "optical data rate to ground",
+    "correlation length of clouds",
+    "time that weather holds",
+    "pointing loss",
+    "orbit altitude",
+)
+"""The assumptions that are looked at here."""
+
+
+def whole_day(folder, *changes, asked=ASKED):
+    """A day with some of its assumptions changed, and without the tornados of its links."""
+    every = assumptions._changes
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(assumptions, "_changes", lambda *args: [each for each in every(*args) if each[0] in asked])
+        patch.setattr(link_study, "tornados", lambda *args: ())
+        return day_study.run_day_study(link_study.run_link_study(day_file(folder, ALONE, *changes)))
 
 
 @pytest.fixture(scope="module")
 def day(tmp_path_factory):
     """A day with relay, radio and an optical network under clouds."""
-    folder = tmp_path_factory.mktemp("day")
     clouds = {"kiruna": 0.4, "tenerife": 0.7}
-    return day_study.run_day_study(
-        link_study.run_link_study(day_file(folder, ALONE, optical(clouds, data_rate="10 Gbit/s")))
-    )
+    return whole_day(tmp_path_factory.mktemp("day"), optical(clouds, data_rate="10 Gbit/s"))
 
 
 @pytest.fixture(scope="module")
 def without_radio(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("day")
-    return day_study.run_day_study(
-        link_study.run_link_study(day_file(folder, ALONE, NO_RADIO, optical({"tenerife": 0.7})))
-    )
+    return whole_day(tmp_path_factory.mktemp("day"), NO_RADIO, optical({"tenerife": 0.7}), asked=ASKED[:3])
 
 
 def swing_of(day, name):

@@ -42,7 +42,7 @@ ten_micrometres = 1e-5
 one_microradian = 1e-6
 rounding_rad = 4e-15
 
-quick = settings(deadline=None, max_examples=150, derandomize=True)
+quick = settings(deadline=None, max_examples=60, derandomize=True)
 
 
 @pytest.fixture(autouse=True)

@@ -14,7 +14,7 @@ from microrad.mirror import model as mirror
 from microrad.mission.file import load_mission
 from microrad.study import paper
 from scenes import cases_of
-from shipped import SHIPPED, edited
+from shipped import SHIPPED, edited, whole_study
 
 ACCURATE = "PID + inverse stays within 10 µrad at its peaks"
 
@@ -25,10 +25,10 @@ def mission():
 
 
 @pytest.fixture(scope="module")
-def scanned(mission):
-    """The scan of the shipped mission, and what it said of its progress."""
-    said = []
-    return paper.scan(cases_of(mission), lambda *message: said.append(message)), said
+def scanned():
+    """The scan of the shipped mission in its study, and what it said of its progress."""
+    found, said = whole_study()
+    return found.scan, [message for message in said if message[2] == "scan of gains and compositions"]
 
 
 def at(scan, composition, integral, proportional=1e3):
@@ -43,8 +43,7 @@ def at(scan, composition, integral, proportional=1e3):
 def test_the_scan_covers_its_grid_and_tells_its_progress(scanned):
     scan, said = scanned
     assert len({(p.composition, p.proportional_v_rad, p.integral_v_rad_s) for p in scan.points}) == 60
-    assert [done for done, _, _ in said] == list(range(1, 61))
-    assert {message[1:] for message in said} == {(60, "scan of gains and compositions")}
+    assert [message[:2] for message in said] == [(done, 60) for done in range(1, 61)]
     assert all(p.stable for p in scan.points)
 
 

@@ -43,6 +43,12 @@ def shipped():
     return whole_study()
 
 
+@pytest.fixture(scope="module")
+def dayless(tmp_path_factory):
+    """The study of the shipped mission without its day and its fine-pointing loop."""
+    return study.run_study(edited_file(tmp_path_factory.mktemp("dayless"), day=False))
+
+
 @pytest.fixture
 def variant(coarse, monkeypatch, tmp_path):
     """The study of the shipped mission with pieces of its text replaced, without a scan and without its day."""
@@ -360,12 +366,10 @@ def test_the_residual_in_the_budget_says_which_run_it_is_from(shipped):
     assert line.source == "simulated: given, PID + inverse, 25 Hz, peak (per-axis)"
 
 
-def test_a_link_with_more_light_received_than_sent_does_not_close(tmp_path):
+def test_a_link_with_more_light_received_than_sent_does_not_close(tmp_path, dayless):
     """The paper's terminals at 1 m, without a fine-pointing loop and with one."""
-    far, near = (
-        study.run_study(edited_file(tmp_path, ('distance = "42000 km"', f'distance = "{text}"'), day=False))
-        for text in ("42000 km", "1 m")
-    )
+    far = dayless
+    near = study.run_study(edited_file(tmp_path, ('distance = "42000 km"', 'distance = "1 m"'), day=False))
     assert (far.achieved.possible, far.closes, far.requirements[-1].unknown) == (True, True, "")
     row = near.requirements[-1]
     assert near.margin_db > 100.0 and row.margin > 100.0
@@ -378,13 +382,11 @@ def test_a_link_with_more_light_received_than_sent_does_not_close(tmp_path):
     assert not any(case.possible for case in near.performance.cases)
 
 
-def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path):
+def test_a_jitter_is_not_summed_with_what_the_simulated_loop_leaves(tmp_path, dayless):
     """The paper's mission with [jitter]: one margin is judged, and each other one stands under its own name."""
     jitter = '[jitter]\nbias = ["0 urad", "0 urad"]\nrms = ["10 urad", "10 urad"]\nbandwidth = "50 Hz"\n\n'
-    plain, shaken = (
-        study.run_study(edited_file(tmp_path, ("[requirement]", text), day=False))
-        for text in ("[requirement]", jitter + "[requirement]")
-    )
+    plain = dayless
+    shaken = study.run_study(edited_file(tmp_path, ("[requirement]", jitter + "[requirement]"), day=False))
     assert shaken.requirements == plain.requirements and headline(shaken) == headline(plain)
     assert shaken.tornado == plain.tornado
     error_rad = 10e-6 * np.sqrt(-2.0 * np.log(0.003))
@@ -455,7 +457,7 @@ def test_power_is_advised_up_to_ten_times_of_what_there_is_however_much_lacks(ma
     assert said == (near if margin_db == -1.0 else "; to meet it, change communication.distance")
 
 
-def test_a_judged_pointing_loss_beyond_20_db_is_warned_of(tmp_path):
+def test_a_judged_pointing_loss_beyond_20_db_is_warned_of(tmp_path, dayless):
     """A beam of 15 cm that its loop leaves 12 µrad off: the budget at its static error of 1 µrad warns of nothing."""
     wide = ('leo_aperture = "5 cm"', 'leo_aperture = "15 cm"')
     error = 'pointing_error = "10 urad"            # paper: Table 2'
@@ -464,7 +466,7 @@ def test_a_judged_pointing_loss_beyond_20_db_is_warned_of(tmp_path):
     warning = words.warnings(found)[0]
     assert warning.startswith(f"the verdict's pointing loss of {found.achieved.loss_db('Pointing loss'):.2f} dB is bey")
     assert not any("Pointing loss" in each for each in found.links.communication.warnings)
-    assert not any("20 dB" in each for each in words.warnings(study.run_study(edited_file(tmp_path, day=False))))
+    assert not any("20 dB" in each for each in words.warnings(dayless))
 
 
 def test_claims_of_the_links_are_judged_on_the_papers_numbers_whatever_the_receiver(tmp_path):
