@@ -1,7 +1,7 @@
 """Mirrors to be identified, made by NumPy and SciPy alone: play operators, Bouc-Wen, creep, a resonance behind them."""
 
 import numpy as np
-from scipy.signal import lsim
+from scipy.signal import cont2discrete, lfilter
 
 from microrad.lab.recording import recording_from_arrays
 
@@ -58,12 +58,20 @@ def bouc_wen(drive, rate_hz, parameters, *, gamma=0.0, eta=0.0, exponent=1.0, pi
     return np.array(found)
 
 
+def behind(system, signal, rate_hz, *, held=False):
+    """A signal, straight between its samples or held, behind numerator and denominator; it and they begin at rest.
+
+    What scipy's lsim gives, without its loop over the samples.
+    """
+    numerator, denominator, _ = cont2discrete(system, 1 / rate_hz, "zoh" if held else "foh")
+    return lfilter(numerator[0], denominator, signal)
+
+
 def behind_resonance(signal, rate_hz, resonance=RESONANCE, *, held=False):
     """A signal, straight between its samples or held, behind a second-order low-pass of unit gain."""
     natural, damping = 2 * np.pi * resonance[0], resonance[1]
-    time = np.arange(signal.size) / rate_hz
     system = ([natural**2], [1.0, 2 * damping * natural, natural**2])
-    return lsim(system, signal - signal[0], time, interp=not held)[1]
+    return behind(system, signal - signal[0], rate_hz, held=held)
 
 
 def creep(drive, rate_hz, times, weight, before=None):
@@ -71,7 +79,7 @@ def creep(drive, rate_hz, times, weight, before=None):
     time = np.arange(drive.size) / rate_hz
     total = np.zeros(drive.size)
     for tau in times:
-        total += lsim(([1.0], [tau, 1.0]), drive - drive[0], time)[1]
+        total += behind(([1.0], [tau, 1.0]), drive - drive[0], rate_hz)
         total += ((drive[0] if before is None else before) - drive[0]) * np.exp(-time / tau)
     return weight * total
 

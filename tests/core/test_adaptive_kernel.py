@@ -72,7 +72,7 @@ def track(of, field, lanes=slice(None)):
 @pytest.mark.promise("hysteresis-18", "pointing-25", "pointing-26")
 @pytest.mark.parametrize("gain", [0.8, 1.0])
 def test_it_is_its_twin(gain):
-    case, lanes = loop_of(gain=gain, gauge_noise=2e-3), [0, 41]
+    case, lanes = loop_of(gain=gain, gauge_noise=2e-3), [41]
     ours = run(case, wave())
     twins = [pointing.run_twin(case, 5 + lane, np.zeros(0), wave()) for lane in lanes]
     assert_allclose(ours.residual[:, 0, lanes].T, [[e[0] for e, _ in t.samples] for t in twins], atol=ROUNDING)

@@ -6,7 +6,6 @@ import sys
 from decimal import Decimal, localcontext
 from math import exp, log
 
-import control
 import numba
 import numpy as np
 import pytest
@@ -685,7 +684,7 @@ def run_by_columns(mirror, step_s, drive):
 @by_mirror
 @pytest.mark.parametrize("run", [oracles.run_open_loop, run_by_columns])
 def test_open_loop_is_its_twin(mirror, run):
-    drive = make_drive(mirror.B.shape[1], 500)
+    drive = make_drive(mirror.B.shape[1], 300)
     y, z, state = run(mirror, STEP, drive)
     y_twin, z_twin, twin = oracles.open_loop(mirror, STEP, drive)
     within = share(mirror)
@@ -765,6 +764,8 @@ def test_with_an_empty_bank_the_mirror_is_a_linear_system(reference):
     if reference == "scipy":
         expected = lsim(StateSpace(*matrices), drive, times)[1]
     else:
+        import control  # not at the top: a second interpreter reads this file, and has no use for it
+
         expected = control.forced_response(control.ss(*matrices), times, drive.T).outputs.T
     close(oracles.run_open_loop(mirror, STEP, drive)[0], expected, 1e-11)
 
@@ -785,10 +786,10 @@ def test_the_step_converges_to_the_continuous_plant(name):
     def drive_rate(t):
         return sign * 1.5 * 2 * np.pi * 60 * np.sin(2 * np.pi * 60 * t)
 
-    times = np.linspace(0, 0.02, 101)
+    times = np.linspace(0, 0.01, 51)  # beyond the reversal at 8.3 ms
     step_s = times[1] / 100
     expected = oracles.reference_solution(mirror, drive, drive_rate, times, rtol=1e-9, atol=1e-12)
-    u = np.array([drive(t) for t in step_s * np.arange(1, 10_001)])
+    u = np.array([drive(t) for t in step_s * np.arange(1, 5001)])
     y = oracles.run_open_loop(mirror, step_s, u)[0][99::100]
     error = np.max(np.abs(y - expected[1:])) / np.max(np.abs(expected))
     print(f"within {error:.2g} of the largest output")
@@ -857,9 +858,9 @@ def test_closed_loop_is_its_twin(mirror, kind):
     check_closed_loop(mirror, kind)
 
 
-def check_closed_loop(mirror, kind):
+def check_closed_loop(mirror, kind, samples=100):
     loop = make_loop(mirror, kind)
-    reference = make_reference(mirror, 150, STEP * loop.steps_per_sample)
+    reference = make_reference(mirror, samples, STEP * loop.steps_per_sample)
     run, _ = oracles.run_closed_loop(mirror, STEP, loop, reference)
     twin = oracles.closed_loop(mirror, STEP, loop, reference)
     for name in ("output", "command", "drive"):
@@ -1156,7 +1157,7 @@ def test_the_kernels_run_as_they_are_without_the_compiler(tmp_path):
         "np.savez(sys.argv[1], **{name.replace(' ', '_'): v for name, v in test_kernels.battery().items()})\n"
         "for mirror in test_kernels.MIRRORS.values():\n"
         "    for kind in ('plain', 'delayed'):\n"
-        "        test_kernels.check_closed_loop(mirror, kind)\n"
+        "        test_kernels.check_closed_loop(mirror, kind, 40)\n"
         "print('every loop is its twin')\n"
     )
     path = tmp_path / "uncompiled.npz"

@@ -16,6 +16,9 @@ def averaged(amplitude, rms, quadratures):
     def seen(phase):
         return math.cos(phase) - (math.sin(phase) if quadratures == 2 else 0.0)
 
+    def density(x):
+        return math.exp(-((x / rms) ** 2) / 2.0) / (math.sqrt(2.0 * math.pi) * rms)
+
     first, near = math.pi / (2 * quadratures), (1.0, 3.0, 10.0, 30.0)
     signs = [first + k * math.pi for k in range(-8, 9)]
     edges = {k * rms / 2.0 for k in range(-30, 31)} | set(signs)
@@ -23,7 +26,10 @@ def averaged(amplitude, rms, quadratures):
     pieces = pairwise(sorted(edge for edge in edges if abs(edge) <= 15.0 * rms))
     return math.fsum(
         integrate.quad(
-            lambda x: stats.norm.pdf(x, scale=rms) * stats.norm.sf(amplitude * seen(x)), *ends, epsabs=0.0, epsrel=1e-11
+            lambda x: density(x) * math.erfc(amplitude * seen(x) / math.sqrt(2.0)) / 2.0,
+            *ends,
+            epsabs=0.0,
+            epsrel=1e-11,
         )[0]
         for ends in pieces
     )

@@ -41,7 +41,7 @@ def test_the_integral_is_the_sum_over_all_counts(order, pulse, background):
 def test_capacity_is_what_simulated_words_tell(order, pulse, background):
     random = np.random.Generator(np.random.Philox(key=order))
     told = []
-    for _ in range(5):
+    for _ in range(2):
         counts = random.poisson(background, (10_000, order)).astype(float)
         counts[:, 0] += random.poisson(pulse, 10_000)
         above = (counts - counts[:, :1]) * math.log1p(pulse / background)

@@ -407,6 +407,7 @@ def test_other_things_that_cannot_be(hysteretic_records):
 
 
 # ------------------------------------------------------------------------------------------------------------- CubeSpec
+@pytest.mark.endurance
 @needs_cubespec
 def test_the_ladder_on_cubespec(monkeypatch):
     """Four realisations, four states and few iterations: the choice needs hysteresis already."""

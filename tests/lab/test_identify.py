@@ -266,7 +266,7 @@ def test_recovers_from_an_independent_generator():
     assert abs(fit.model.d1_rad_v / D1 - 1) < 3.5 * fit.standard_errors[0] / D1 < 0.01
     assert abs(fit.model.delta_s_v / DELTA - 1) < 0.05
     assert abs(fit.settled_hysteresis_rad[0] / SETTLED - 1) < 0.08
-    for freq_hz in (60, 80):
+    for freq_hz in (60,):
         truth = 1e3 * independent_output_rad(freq_hz)
         prediction = predict(fit, recording_from_arrays(sine(freq_hz), truth, RATE_HZ))
         residual = prediction.residual_rad[prediction.start :]
@@ -327,14 +327,14 @@ def test_a_start_in_a_wrong_minimum_is_not_counted():
     assert max(fit.start_rms_percent) > 1.005 * min(fit.start_rms_percent)
 
 
-def test_same_seed_same_fit(fit_trio):
-    recordings = [record(60, 1), record(80, 2), record(100, 3)]
-    again = fit_bouc_wen(recordings)
-    np.testing.assert_array_equal(again.values, fit_trio.values)
-    assert again.start_rms_percent == fit_trio.start_rms_percent
+def test_same_seed_same_fit():
+    recordings = [record(60, 1), record(100, 3)]
+    one, again = (fit_bouc_wen(recordings, starts=3) for _ in range(2))
+    np.testing.assert_array_equal(again.values, one.values)
+    assert again.start_rms_percent == one.start_rms_percent
     other = fit_bouc_wen(recordings, starts=3, seed=1)
-    assert other.start_rms_percent[1:] != fit_trio.start_rms_percent[1:3]
-    np.testing.assert_allclose(other.values, fit_trio.values, rtol=1e-3)
+    assert other.start_rms_percent[1:] != one.start_rms_percent[1:]
+    np.testing.assert_allclose(other.values, one.values, rtol=1e-3)
 
 
 def test_progress_is_called_per_start():
@@ -680,7 +680,8 @@ def test_straight_line_is_the_least_squares_line():
 
 
 @pytest.mark.promise("identify-8", "identify-9")
-def test_held_out_samples_are_not_seen_by_the_fit():
+def test_held_out_samples_are_not_seen_by_the_fit(monkeypatch):
+    monkeypatch.setattr(candidates, "_STARTS", 2)
     original = record(100, 5, seconds=0.2)
     drive, output = original.drive.copy(), original.output.copy()
     drive[5000:] = 3 * drive[5000:][::-1]
@@ -728,7 +729,8 @@ def test_warnings_of_two_rates(identification):
 
 @pytest.mark.promise("identify-6")
 @pytest.mark.promise("identify-54")
-def test_warnings_of_one_rate_drift_and_noise():
+def test_warnings_of_one_rate_drift_and_noise(monkeypatch):
+    monkeypatch.setattr(candidates, "_STARTS", 2)
     r = record(100, 3, seconds=0.2)
     trend = 0.05 * np.ptp(r.output) * np.linspace(0, 1, r.samples)[:, None]
     drive = r.drive + 0.03 * philox(8).standard_normal((r.samples, 1))
@@ -763,6 +765,7 @@ def test_progress_of_the_whole():
 # ------------------------------------------------------------------------------------------------------ real recording
 @needs_real
 def test_real_recording(monkeypatch):
+    monkeypatch.setattr(candidates, "_STARTS", 4)
     recording, evaluations = read_recording(REAL, 0, 4, 200.0), []
 
     def counted(residual, *args, real=scipy.optimize.least_squares, **options):
@@ -771,7 +774,7 @@ def test_real_recording(monkeypatch):
     monkeypatch.setattr(scipy.optimize, "least_squares", counted)
     assert recording.samples == 8027
     result = identify([recording], models=STATIC, **UM)
-    assert 1000 < len(evaluations) < 6000
+    assert 80 < len(evaluations) / 4 < 500  # of each start
     scores = {score.model: score for score in result.scores}
     assert 0.6 < scores["prandtl_ishlinskii"].fit_rms_percent < 0.75
     assert 0.75 < scores["prandtl_ishlinskii"].held_out_rms_percent < 0.9

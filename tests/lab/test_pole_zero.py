@@ -24,7 +24,7 @@ from microrad.lab.identify.selection.candidates import _fewer_poles, _without_sp
 from microrad.lab.recording import recording_from_arrays
 from microrad.mirror import model as mirror
 from microrad.mission.tables.fine_pointing import FinePointing
-from truths import behind_resonance, creep, philox, plays, recorded, two_sines
+from truths import behind, behind_resonance, creep, philox, plays, recorded, two_sines
 
 NONE = np.zeros((0, 0))  # nothing of a record's own
 
@@ -80,7 +80,7 @@ def answer(drive, poles, *, between="first-order", delay_s=0.0, zeros=(), creeps
     moved = np.interp(fine, np.arange(drive.size), moved) if between == "first-order" else moved[fine.astype(int)]
     numerator, denominator = np.atleast_1d(np.real(np.poly(zeros))), np.real(np.poly(poles))
     system = (numerator * denominator[-1] / numerator[-1], denominator)
-    output = GAIN * lsim(system, moved, fine / RATE, interp=between == "first-order")[1]
+    output = GAIN * behind(system, moved, FINE * RATE, held=between == "zero-order")
     if creeps:
         output += creep(moved, FINE * RATE, 10.0 ** np.arange(-1.75, 2.0, 0.5), 0.006 * GAIN)
     steps = round(delay_s * RATE * FINE)

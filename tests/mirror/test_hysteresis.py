@@ -135,7 +135,7 @@ def random_models(exponent, count=25):
 
 @pytest.mark.parametrize(
     "exponent",
-    EXPONENTS,
+    [pytest.param(e, marks=pytest.mark.endurance if e in (1.5, 3.0) else ()) for e in EXPONENTS],
 )
 def test_how_far_an_asymmetric_model_moves_the_wrong_way(exponent):
     found, wrong = [], []
