@@ -35,6 +35,7 @@ from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import Line, Panel, Rule
 from microrad.report.quantities import minus
 from microrad.report.requirements import nearest, nearness
+from microrad.report.results import arrays
 from microrad.report.study import chain, page, words
 from microrad.report.study import contributors as requirement_views
 from microrad.report.study import data as study_data
@@ -65,6 +66,12 @@ def written(paper, tmp_path_factory):
     target = tmp_path_factory.mktemp("report") / "study"
     assert report.write(paper, target) == target / "report.html"
     return target
+
+
+@pytest.fixture
+def no_numbers(monkeypatch):
+    """A folder without what `results.nc` holds, which `written` has, and which takes a second."""
+    monkeypatch.setattr(arrays, "study_netcdf", lambda study: b"")
 
 
 class Links(HTMLParser):
@@ -333,6 +340,7 @@ def test_the_margins_of_the_loop_are_in_decibels_and_degrees(paper):
     assert page._margins(replace(paper, margins=known))[:2] == [("gain margin", "6.0 dB"), ("phase margin", "60°")]
 
 
+@pytest.mark.usefixtures("no_numbers")
 def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
     other = study.run_study(edited_file(tmp_path, day=False))
     visible = " ".join(parsed(report.write(other, tmp_path / "out").read_text(encoding="utf-8")).text)
@@ -507,6 +515,7 @@ def test_the_manifest_names_mission_versions_and_every_file(written, paper):
 
 
 @pytest.mark.promise("report-3")
+@pytest.mark.usefixtures("no_numbers")
 def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
     """The first one's figures may be another process's."""
     report.write(paper, tmp_path / "again")
@@ -515,6 +524,7 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
 
 
 @pytest.mark.promise("report-1", "report-22")
+@pytest.mark.usefixtures("no_numbers")
 def test_results_are_never_replaced_silently(paper, tmp_path, monkeypatch):
     monkeypatch.setattr(report, "study_figures", lambda *args: page.StudyFigures())
     target = tmp_path / "out"
@@ -567,6 +577,7 @@ def no_bench(monkeypatch):
     monkeypatch.setattr(bench, "bench_figures", lambda *args: ())
 
 
+@pytest.mark.usefixtures("no_numbers")
 def test_text_of_the_mission_is_escaped(paper, tmp_path, monkeypatch):
     drawn = plain_drawn()
     monkeypatch.setattr(report, "study_figures", lambda *args: drawn)
@@ -580,7 +591,7 @@ def test_text_of_the_mission_is_escaped(paper, tmp_path, monkeypatch):
     assert json.loads(manifest)["mission"]["text"] == file.text
 
 
-@pytest.mark.usefixtures("no_scan", "no_bench")
+@pytest.mark.usefixtures("no_scan", "no_bench", "no_numbers")
 def test_a_hopeless_link_is_reported_not_refused(tmp_path):
     file = edited_file(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'), day=False)
     hopeless = study.run_study(file)

@@ -30,6 +30,8 @@ from microrad.report.day import words as day_words
 from microrad.report.day.constellation import partners_table, plan_data, plan_sentences, plan_text, satellites_table
 from microrad.report.day.contact_run import contact_sentences, windows_table
 from microrad.report.day.figures import day_figures
+from microrad.report.paper import bench
+from microrad.report.paper import figures as paper_figures
 from microrad.report.quantities import duration, volume
 from microrad.report.results import arrays
 from microrad.report.results.manifest import manifest_of
@@ -65,8 +67,12 @@ def found(file, fine):
 
 @pytest.fixture(scope="module")
 def written(found, tmp_path_factory):
+    """The report without the figures of the paper."""
     target = tmp_path_factory.mktemp("day") / "study"
-    report.write(found, target)
+    with pytest.MonkeyPatch.context() as patch:
+        for module, name in ((paper_figures, "paper_figures"), (bench, "bench_figures")):
+            patch.setattr(module, name, lambda *args: ())
+        report.write(found, target)
     return target
 
 
@@ -338,8 +344,10 @@ def test_contacts_of_several_days_are_told_in_all_and_by_the_day():
 
 
 @pytest.mark.promise("report-7")
+@pytest.mark.usefixtures("undrawn")
 def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     monkeypatch.setattr(study.paper, "applies", lambda mission: False)
+    monkeypatch.setattr(arrays, "study_netcdf", lambda study: b"")
     text = SHIPPED.read_text(encoding="utf-8")
     begin, end = (
         text.index("# ---", text.index("jitter = ")),

@@ -28,11 +28,15 @@ from microrad.loop.pointing_loop.linear import close, residual_spectrum, station
 from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.loop.worst_case import Extent, InTime, Quantiles, Sensitivity, Worst, WorstCase
 from microrad.report import quantities
+from microrad.report.day import figures as day_figures
 from microrad.report.fine_pointing import data as plain_data
 from microrad.report.fine_pointing import figures, simulated_windows, tails, windows, words, worst_case
 from microrad.report.fine_pointing import page as section
 from microrad.report.fine_pointing import recording as recorded
 from microrad.report.fine_pointing.figures import fine_pointing_figures
+from microrad.report.links import figures as link_figures
+from microrad.report.paper import bench
+from microrad.report.paper import figures as paper_figures
 from microrad.report.plotting.sheet import Line, Panel, Rule
 from microrad.report.requirements import requirement_table
 from microrad.report.results import arrays
@@ -174,8 +178,18 @@ def with_residual(fine, name, variant="given", **to):
 
 @pytest.fixture(scope="module")
 def written(plain, fine, tmp_path_factory):
+    """The report with the figures of the loop and of its tails alone, and one trace."""
     target = tmp_path_factory.mktemp("report") / "study"
-    report.write(with_fine(plain, fine), target)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(arrays, "study_netcdf", lambda of: study_netcdf(replace(of, runs=of.runs[:1])))
+        for module, name in (
+            (paper_figures, "paper_figures"),
+            (bench, "bench_figures"),
+            (link_figures, "link_figures"),
+            (day_figures, "day_figures"),
+        ):
+            patch.setattr(module, name, lambda *args: ())
+        report.write(with_fine(plain, fine), target)
     return target
 
 
@@ -185,10 +199,10 @@ def render(of, drawn=()):
         return report_page.study_page(of, StudyFigures(fine=tuple(drawn)), manifest_of(of, summary(of), Path(nothing)))
 
 
-def results_of(of, folder):
-    """What results.nc holds, with one trace."""
+def results_of(of, folder, group=None):
+    """What results.nc holds, or one group of it, with one trace."""
     (folder / "results.nc").write_bytes(study_netcdf(replace(of, runs=of.runs[:1])))
-    return xr.open_datatree(folder / "results.nc", engine="h5netcdf")
+    return xr.open_datatree(folder / "results.nc", engine="h5netcdf", group=group)
 
 
 class Tables(HTMLParser):
@@ -737,11 +751,11 @@ def test_every_number_of_the_summary_has_its_unit_in_its_key(plain, fine):
 
 @pytest.mark.promise("readme-11", "report-13")
 def test_results_hold_the_loop_with_units(written, fine):
-    with xr.open_datatree(written / "results.nc", engine="h5netcdf") as tree:
-        for node in tree["fine_pointing"].subtree:
+    with xr.open_datatree(written / "results.nc", engine="h5netcdf", group="fine_pointing") as tree:
+        for node in tree.subtree:
             for variable in node.to_dataset(inherit=False).variables.values():
                 assert variable.attrs["units"] and variable.attrs["long_name"]
-        spectra, residuals = tree["fine_pointing/spectra"], tree["fine_pointing/residuals"]
+        spectra, residuals = tree["spectra"], tree["residuals"]
         assert spectra["residual"].attrs["units"] == spectra["before"].attrs["units"] == "rad^2/Hz"
         assert_array_equal(spectra["before"].values, fine.disturbed_rad2_hz)
         for v in fine.verified:
@@ -752,13 +766,13 @@ def test_results_hold_the_loop_with_units(written, fine):
                 here = residuals.sel(controller=name, mirror=variant)
                 assert (float(here["rms"]), float(here["quantile"])) == (r.rms_rad, r.quantile_rad)
                 assert_array_equal(here["axis_rms"].values, r.axis_rms_rad)
-            noise = tree["fine_pointing/theory"]["rms_by_source"].sel(controller=name, source="optical sensor noise")
+            noise = tree["theory"]["rms_by_source"].sel(controller=name, source="optical sensor noise")
             assert_allclose(
                 float(noise), math.sqrt(np.sum(v.theory.error_by_source["optical sensor noise"])), rtol=1e-12
             )
-        assert float(tree["fine_pointing/error_budget"]["full"]) == fine.budget.full_rad
-        assert_array_equal(tree["fine_pointing/sines"]["quantile"].values, [s.quantile_rad for s in fine.sines])
-        assert tree["fine_pointing/margins"]["delay_s"].attrs["units"] == "s"
+        assert float(tree["error_budget"]["full"]) == fine.budget.full_rad
+        assert_array_equal(tree["sines"]["quantile"].values, [s.quantile_rad for s in fine.sines])
+        assert tree["margins"]["delay_s"].attrs["units"] == "s"
 
 
 def test_limits_and_a_variant_that_is_missing_reach_results(plain, fine, tmp_path):
@@ -767,8 +781,8 @@ def test_limits_and_a_variant_that_is_missing_reach_results(plain, fine, tmp_pat
     text = render(whole)
     assert row(read(text), "What each controller leaves", THIRD)[5:] == ["", "", ""] * 2
     assert "sines under vibration" not in text
-    with results_of(whole, tmp_path) as tree:
-        here = tree["fine_pointing/residuals"].sel(controller=THIRD)
+    with results_of(whole, tmp_path, "fine_pointing/residuals") as tree:
+        here = tree.sel(controller=THIRD)
         assert float(here["share"].sel(mirror="given", limit="saturated samples")) == 0.125
         assert float(here["share"].sel(mirror="given", limit="slew-limited steps")) == 0.0
         assert math.isnan(float(here["rms"].sel(mirror="comparison")))
