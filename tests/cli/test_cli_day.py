@@ -35,6 +35,8 @@ MISSIONS = {
     "always in view": ALWAYS,
     "a share": {"operations.relay_share": 0.5},
 }
+SAID_ELSEWHERE = ("nothing direct", "nothing at all")
+"""Two of the others at once, and what `test_where_nothing_goes_direct…` has in its own words."""
 ONCE = (
     (link_study, "run_link_study", found_once(link_study.run_link_study)),
     (day_study, "run_day_study", found_once(day_study.run_day_study, lambda links: links.file)),
@@ -49,6 +51,12 @@ def once(monkeypatch):
         monkeypatch.setattr(module, name, found)
 
 
+@pytest.fixture
+def unchanged(monkeypatch):
+    """A day of which no assumption is changed, which takes most of its time; its mission is that of no other test."""
+    monkeypatch.setattr(day_study, "swings", lambda *args: ())
+
+
 def path_of(folder, *changes):
     return day_path(folder, QUICK, *changes)
 
@@ -61,7 +69,9 @@ def words_of(page):
 
 # ------------------------------------------------------------------------------------------------------------ contacts
 @pytest.mark.promise("day-1", "day-3", "day-4", "day-5")
-@pytest.mark.parametrize("name", MISSIONS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.endurance] * (name in SAID_ELSEWHERE)) for name in MISSIONS]
+)
 def test_contacts_in_words_without_a_number_that_is_none(call, folder, name):
     result = call("contacts", path_of(folder, MISSIONS[name]))
     assert (result.code, result.err) == (1 if name in ("no contact", "nothing at all") else 0, "")
@@ -105,6 +115,7 @@ def test_words_of_a_share_keep_the_view_apart_from_what_is_granted(call, folder)
 
 @pytest.mark.promise("readme-8")
 @pytest.mark.promise("day-3")
+@pytest.mark.usefixtures("unchanged")
 def test_contacts_as_csv(call, folder):
     result = call("contacts", path_of(folder, {"orbit.duration": "12 h"}), "--csv")
     assert (result.code, result.err) == (0, "")
@@ -178,6 +189,7 @@ def test_contacts_as_a_page_that_loads_nothing(call, folder, name):
     assert listing(folder).keys() == {"day.toml"}
 
 
+@pytest.mark.usefixtures("unchanged")
 def test_a_name_is_no_markup(call, folder):
     path = path_of(folder, {"terminals.geo_name": "<b>&G"})
     page = call("contacts", path, "--html").out
@@ -299,6 +311,7 @@ def test_a_rate_that_the_receiver_does_not_take_is_refused(refused, folder):
     assert "5 Gbit/s" in refused("contacts", path)
 
 
+@pytest.mark.usefixtures("unchanged")
 def test_rates_that_the_receiver_does_not_take_are_left_out(call, folder):
     receiver = {"modulation": "bpsk", "detector": "homodyne", "efficiency": 0.7, "bit_error_ratio": 1e-6}
     receiver = {**receiver, "code_gain": "5 dB", "code_rate": 0.8, "bandwidth": "1 GHz"}
@@ -324,10 +337,12 @@ def test_help_lists_both_commands(call, folder):
 
 
 @pytest.mark.promise("day-1")
-def test_the_loss_is_the_jitters_where_the_mission_has_one(call, folder):
+def test_the_loss_is_the_jitters_where_the_mission_has_one(call, folder, monkeypatch):
     jitter = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
     path = path_of(folder, jitter)
-    data = json.loads(call("contacts", path, "--json").out)
+    with monkeypatch.context() as patch:
+        patch.setattr(day_study, "swings", lambda *args: ())  # as of `unchanged`
+        data = json.loads(call("contacts", path, "--json").out)
     found = link_study.run_link_study(load_link(path)).under_jitter
     assert (data["pointing_loss_db"], data["outage"]) == (found.outage_loss_db, found.outage)
     assert data["pointing_loss_source"] == "jitter as given"

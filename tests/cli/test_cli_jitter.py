@@ -1,9 +1,9 @@
 """`microrad jitter`: a recording through the loop, played and as a fitted spectrum, as text and as data."""
 
+import io
 import json
 import math
-import subprocess
-import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +12,7 @@ import pytest
 from scipy.signal import lfilter
 
 import several_axes
+from microrad import cli
 from microrad.cli import jitter as cli_jitter
 from microrad.cli.frame import Refusal
 from microrad.lab.recording import Motion, read_motion
@@ -38,9 +39,10 @@ def jitter(path, seconds=8.0, heading="time (s),x (urad)", noise=0.1):
 def document(tmp_path_factory):
     """The data of the shipped mission with a recording."""
     recording = jitter(tmp_path_factory.mktemp("recording") / "jitter.csv")
-    command = [sys.executable, "-m", "microrad", "jitter", DEFAULT, recording, "--json"]
-    ran = subprocess.run(command, capture_output=True, text=True, check=True)
-    return json.loads(ran.stdout)
+    with redirect_stdout(io.StringIO()) as printed, pytest.raises(SystemExit) as stop:
+        cli.app(args=["jitter", str(DEFAULT), str(recording), "--json"], prog_name="microrad")
+    assert not stop.value.code
+    return json.loads(printed.getvalue())
 
 
 @pytest.mark.promise("pointing-67")

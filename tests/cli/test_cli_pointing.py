@@ -1,9 +1,9 @@
 """`microrad pointing`: errors in time windows, by source, as text and as data."""
 
+import io
 import json
 import math
-import subprocess
-import sys
+from contextlib import redirect_stdout
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +11,7 @@ import pytest
 
 import several_axes
 from link_files import FADING
+from microrad import cli
 from microrad.cli import coupled_design
 from microrad.cli import pointing as cli_pointing
 from microrad.cli.coupled_design import reach_share_percent
@@ -28,9 +29,11 @@ from shipped import DEFAULT, without_fine_pointing
 @pytest.fixture(scope="module")
 def document():
     """The data of the shipped mission, with a mean over a second and its drift over a minute."""
-    command = [sys.executable, "-m", "microrad", "pointing", DEFAULT, "--window", "1 s", "--spacing", "1 min", "--json"]
-    ran = subprocess.run(command, capture_output=True, text=True, check=True)
-    return json.loads(ran.stdout)
+    words = ["pointing", str(DEFAULT), "--window", "1 s", "--spacing", "1 min", "--json"]
+    with redirect_stdout(io.StringIO()) as printed, pytest.raises(SystemExit) as stop:
+        cli.app(args=words, prog_name="microrad")
+    assert not stop.value.code
+    return json.loads(printed.getvalue())
 
 
 @pytest.mark.promise("pointing-34")
@@ -203,8 +206,8 @@ def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
         assert found["words"] == 16 * round(1.5 / found["code_word_s"])
     assert shares[0][1] == shares[1][1] > 0.02
     assert shares[1][0] < 0.5 * shares[0][0] < shares[0][1]
-    _, out, _ = call("pointing", coded("10 ms"), "--window", "10 ms", "--simulate", "16")
-    assert "Lost to pointing, simulated" in out and "code words of 10 ms" in out and "Of 2400 code words" in out
+    _, out, _ = call("pointing", coded("10 ms"), "--window", "10 ms", "--simulate", "2")
+    assert "Lost to pointing, simulated" in out and "code words of 10 ms" in out and "Of 300 code words" in out
     _, out, _ = call("pointing", DEFAULT, "--window", "10 ms", "--simulate", "1", "--json")
     assert "code_words" not in json.loads(out)["simulated"]
 
@@ -284,7 +287,8 @@ def test_a_time_without_a_unit_is_refused_by_its_option(call):
     assert (code, out) == (2, "") and "'--window': \"1\" is a number without a unit" in err
 
 
-def test_a_mirror_of_several_axes_has_windows_that_its_design_and_its_runs_agree_with(call, tmp_path):
+def test_a_mirror_of_several_axes_has_windows_that_its_design_and_its_runs_agree_with(call, tmp_path, monkeypatch):
+    monkeypatch.setattr(coupled_study.designs, "names", lambda table: ("PI",))  # the one that is asked for
     (tmp_path / "two-axes.toml").write_text(several_axes.TEXT, encoding="utf-8")
     named = several_axes.mission_text(("[fine_pointing]\n", '[fine_pointing]\nmirror_file = "two-axes.toml"\n'))
     (tmp_path / "m.toml").write_text(named, encoding="utf-8")
@@ -356,6 +360,8 @@ def test_a_worst_case_needs_a_mirror_of_which_something_is_known(refused):
 @pytest.mark.parametrize(("draws", "corners", "code"), [(0, 0, 0), (1, 0, 1), (0, 1, 1)])
 def test_an_unstable_draw_or_corner_alone_ends_the_worst_case_with_1(call, monkeypatch, draws, corners, code):
     found = SimpleNamespace(unstable_draws=draws, unstable_corners=corners)
+    monkeypatch.setattr(controller_study, "design", lambda scene, progress, names: ("made",))
+    monkeypatch.setattr("microrad.loop.worst_case.of_scene", lambda scene, known, made: "subject")
     monkeypatch.setattr("microrad.loop.worst_case.worst_case", lambda *args, **options: found)
     monkeypatch.setattr(worst_case, "worst_case_data", lambda found: {})
     assert call("worst-case", DEFAULT, "--mirror", IDENTIFIED, "--window", "10 ms", "--json").code == code

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad import report
+from microrad import orbit, report
 from microrad.core import lti
 from microrad.core.units import parse_quantity
 from microrad.lab.identify import coupled
@@ -163,6 +163,12 @@ def run_once(monkeypatch):
     return found
 
 
+def assumptions_changed(monkeypatch, shown):
+    """The day with each of its assumptions changed alone, which takes most of its time, only where that is shown."""
+    swings = orbit.day.swings
+    monkeypatch.setattr(orbit.day, "swings", lambda known, *args: swings(known, *args) if shown(known) else ())
+
+
 # ------------------------------------------------------------------------------------------------------------ examples
 @pytest.mark.promise(
     "gallery-1", "gallery-2", "gallery-3", "gallery-4", "gallery-5", "report-2", "report-7", "report-13"
@@ -296,7 +302,9 @@ def test_choosing_a_mirror(walk):
 
 
 @pytest.mark.promise("gallery-1", "gallery-17", "gallery-18", "gallery-19", "gallery-20")
-def test_a_crosslink(walk):
+def test_a_crosslink(walk, monkeypatch):
+    assert "each assumption changed alone" not in EXAMPLES[CROSSLINK]
+    assumptions_changed(monkeypatch, shown=lambda known: False)
     walk.through(EXAMPLES[CROSSLINK])
     found = json.loads(walk.call("contacts", "docs/gallery/crosslink.toml", "--json").out)["contacts"]
     ends = [(each["begins"].partition(" ")[0], each["ends"].partition(" ")[0]) for each in found]
@@ -319,6 +327,9 @@ def test_a_constellations_day(walk):
 @pytest.mark.promise("gallery-32", "gallery-33", "gallery-34", "gallery-35", "gallery-37", "gallery-38", "gallery-39")
 def test_down_to_the_ground_or_up_to_the_relay(walk, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")  # as wide as the page
+    assert "each assumption changed alone" in EXAMPLES[GROUND].rpartition("    microrad contacts leo-geo.toml\n")[2]
+    assert EXAMPLES[GROUND].count("each assumption changed alone") == 1
+    assumptions_changed(monkeypatch, shown=lambda known: len(known.own.operations.optical.stations) == 4)
     walk.through(EXAMPLES[GROUND])
     m = load_link(Path("leo-geo.toml")).mission
     assert {f"{m.communication.data_rate_bit_s / 1e6:g} Mbit/s"} <= GIVEN[GROUND]

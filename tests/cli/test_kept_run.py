@@ -68,6 +68,7 @@ def quick():
             lambda freq_hz, density, **_: SimpleNamespace(disturbance=density.tolist()),
         )
         patch.setattr(study.paper, "applies", lambda mission: False)
+        patch.setattr(study.alternatives, "other_readings", lambda *args: ())
         patch.setattr(day, "swings", lambda *args: ())
         patch.setattr(report, "study_figures", lambda *args: StudyFigures())
         yield

@@ -147,7 +147,7 @@ def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(mi
     api.expect(figure_title(tab, "output (mrad)")).to_have_count(2)
     api.expect(tab.locator(".mirror-file .seen")).to_have_text("a_mrad.csv")
     api.expect(fault).to_contain_text("c_nan.csv: ")
-    picture(tab, "mirror-units.png", full_page=True)
+    fits(tab, "mirror", picture)
     for name in ("c_nan.csv", "a_mrad.csv", "b_urad.csv"):
         tab.locator(".mirror-file", has_text=name).get_by_role("button", name="Remove").click()
         api.expect(tab.locator(".mirror-file", has_text=name)).to_have_count(0)
@@ -160,6 +160,7 @@ def figure_title(tab, words):
 
 
 @pytest.mark.promise("readme-15")
+@pytest.mark.endurance  # test_studio_bench.py and test_studio_commands.py identify without a browser
 def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_used(studio, opened, recording, picture):
     (file, says), tab = recording, opened("mirror")
     drop(tab, file)

@@ -16,6 +16,7 @@ from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.report.campaign import words as campaign_words
 from microrad.studio import commands, server
 from microrad.studio.draft.draft import Draft
+from shipped import without_day
 from small_campaign import campaign_file, children, halted
 
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
@@ -42,6 +43,15 @@ def studio(tmp_path_factory):
 def show_table(page, name):
     page.locator(".mission-entry").filter(has_text=re.compile(rf"^{name}\d*$")).click()
     page.get_by_role("heading", name=f"[{name}]").first.wait_for()
+
+
+def opened_again(studio, tab, text):
+    """Another program writes the mission, and the page opens it again."""
+    studio.file.write_text(text, "utf-8")
+    tab.get_by_role("status").get_by_text("changed on disk; open it again", exact=True).wait_for()
+    tab.get_by_role("button", name="Back to the saved file").click()
+    tab.get_by_role("button", name="Open again").click()
+    draft_is(tab, "saved")
 
 
 def field(page, key):
@@ -118,12 +128,8 @@ def test_a_file_that_another_program_changes_is_told_and_opened_again(studio, ta
     before = studio.file.read_text("utf-8")
     show_table(tab, "terminals")
     for size, text in (("17 cm", before.replace('"15 cm"', '"17 cm"', 1)), ("15 cm", before)):
-        studio.file.write_text(text, "utf-8")
-        tab.get_by_role("status").get_by_text("changed on disk; open it again", exact=True).wait_for()
-        tab.get_by_role("button", name="Back to the saved file").click()
-        tab.get_by_role("button", name="Open again").click()
+        opened_again(studio, tab, text)
         api.expect(tab.get_by_label("geo_aperture")).to_have_value(size)
-        draft_is(tab, "saved")
 
 
 @pytest.mark.promise("studio-20")
@@ -147,6 +153,7 @@ def test_a_text_too_long_for_a_message_is_not_pasted(tab):
     text.get_by_text("#" * 12).wait_for(state="detached")
 
 
+@pytest.mark.endurance  # test_studio_server.py has two tabs without a browser
 def test_a_second_tab_and_a_reload_see_what_the_first_has_changed(tab, opened):
     second = opened()
     for page in (tab, second):
@@ -246,6 +253,7 @@ def job(page, number):
 
 
 @pytest.mark.promise("studio-17")
+@pytest.mark.endurance  # test_studio_jobs.py cancels jobs without a browser
 def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio, tab, opened, picture):
     tab.get_by_role("link", name="Runs").click()
     tab.get_by_role("button", name="Run the study").click()
@@ -266,6 +274,9 @@ def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio,
 
 @pytest.mark.promise("studio-12")
 def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, picture):
+    """Of the mission without its day, of which it knows nothing before another program leaves it out."""
+    whole = studio.file.read_text("utf-8")
+    opened_again(studio, tab, without_day(whole))
     tab.get_by_role("link", name="Runs").click()
     api.expect(tab.get_by_label("Folder for the results")).to_have_value(re.compile("leo-geo-study"))
     tab.get_by_label("Folder for the results").fill("found")
@@ -284,6 +295,9 @@ def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, pic
     with tab.expect_download() as download:
         done.get_by_role("link", name="Save found/manifest.json").click()
     assert json.loads(Path(download.value.path()).read_text("utf-8"))["summary"] == summary
+    fits(tab, "runs", picture)
+    tab.get_by_role("link", name="Mission").click()
+    opened_again(studio, tab, whole)
 
 
 def held_up(studio, tab, number):
@@ -313,6 +327,7 @@ def begun(studio, tab, rows):
     return card, number, command
 
 
+@pytest.mark.endurance  # test_studio_campaign_live.py and test_studio_pages.py have it without a browser
 def test_a_campaign_shows_its_figures_while_it_runs_in_every_tab_and_has_its_report(studio, tab, opened, picture):
     rows, ledger = 384, studio.folder / "campaign.ledger"  # in two chunks
     first, number, command = begun(studio, tab, rows)
@@ -374,5 +389,6 @@ def test_each_page_fits_and_has_no_serious_fault_for_those_who_do_not_see_it(ope
 
 
 def test_each_page_is_looked_at_in_one_test_at_least():
+    """Those of pointing, which is built as that of the links, by `make endurance`; all others here, too."""
     texts = [path.read_text("utf-8") for path in Path(__file__).parent.glob("*_browser.py")]
     assert {name for text in texts for name in re.findall(r'fits\(\w+, "(\w+)", picture\)', text)} == set(server.PAGES)

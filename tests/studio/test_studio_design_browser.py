@@ -74,6 +74,7 @@ def written(studio):
 
 
 # --------------------------------------------------------------------------------------------------------------- links
+@pytest.mark.endurance  # as they follow steps and a slider that is moved
 def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
     before, text = links.evaluate(CORNER), written(studio)
     typed(links, APERTURE).fill("6 cm")
@@ -114,7 +115,7 @@ def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_le
     shown_margin(links, "+3.00 dB")
 
 
-@pytest.mark.endurance  # as the mission's tabs do, in test_studio_browser.py
+@pytest.mark.endurance  # as the day follows the links in another tab
 def test_tabs_of_the_links_follow_each_other(studio, links, opened):
     typed(links, APERTURE).fill("7 cm")
     typed(links, APERTURE).press("Enter")
@@ -181,6 +182,7 @@ def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, li
     assert typed(links, APERTURE).get_attribute("aria-invalid") == "false"
 
 
+@pytest.mark.endurance  # test_studio_design.py has it without a browser
 def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(studio, links, context):
     links.get_by_text("The links close, and ").wait_for()
     typed(links, APERTURE).fill("5 W")
@@ -218,6 +220,7 @@ LEGENDS = """() => [...document.querySelectorAll('.js-plotly-plot')]
 """That no legend takes the room of the data."""
 
 
+@pytest.mark.endurance  # test_studio_design.py has it without a browser
 def test_the_coverage_follows_the_beacon_s_divergence_and_a_narrow_page_has_one_column(studio, opened, picture):
     page = opened("pointing")
     page.get_by_text("with a probability of 0.53").wait_for()

@@ -25,7 +25,7 @@ from microrad.studio.recordings import reading
 from microrad.studio.recordings.uploads import Uploads
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
-from microrad.studio.views import latest, plots
+from microrad.studio.views import errors, latest, plots
 from shipped import SHIPPED
 from studio_jobs import written
 
@@ -141,6 +141,13 @@ def session(tmp_path_factory):
     return found
 
 
+@pytest.fixture(scope="module")
+def budget_seen(session):
+    """What the page of pointing shows of the mission's budget of errors."""
+    file = session.draft.link()
+    return errors.view(file, file.mission.error_budget)
+
+
 @pytest.fixture
 def read_once(monkeypatch):
     """A recording is read by one process, not by one for each visit."""
@@ -182,9 +189,10 @@ WAITS = {"compare": 2, "control": 4, "day": 2, "link": 3, "mirror": 4, "mission"
 
 
 @pytest.mark.parametrize("name", WAITS)
-def test_a_page_may_be_closed_whenever_it_waits(session, name, monkeypatch, read_once):
+def test_a_page_may_be_closed_whenever_it_waits(session, name, monkeypatch, read_once, budget_seen):
     monkeypatch.setattr(link, "_REST_S", -1.0)  # asks for the study of the links at once
     monkeypatch.setattr(compare_view, "link_numbers", lambda draft: ())  # takes a second of each visit
+    monkeypatch.setattr(errors, "view", lambda file, table: budget_seen)  # as this does
     module = importlib.import_module(f"microrad.studio.pages.{name}")
 
     def build(session, visit):

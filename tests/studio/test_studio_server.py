@@ -494,12 +494,13 @@ def running(folder, *args, browser=None, code=HEARD):
         process.communicate()
 
 
+INTERRUPT = pytest.param(signal.SIGINT, marks=pytest.mark.endurance)  # as tests in a browser end theirs
 HANGUP = pytest.param(getattr(signal, "SIGHUP", 1), marks=pytest.mark.endurance)
 
 
 @pytest.mark.promise("readme-15")
 @pytest.mark.promise("studio-2", "studio-4", "studio-6")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, HANGUP])
+@pytest.mark.parametrize("number", [INTERRUPT, signal.SIGTERM, HANGUP])
 @pytest.mark.promise("readme-26")
 def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     before = listing(file.parent)
@@ -711,7 +712,13 @@ def test_every_page_is_there():
     assert [name for name in server.PAGES if not (pages / f"{name}.py").is_file()] == []
 
 
-@pytest.mark.parametrize("loads", [(), ("microrad.study.pointing_penalty",)], ids=["budgets", "with the study"])
+@pytest.mark.parametrize(
+    "loads",
+    [
+        pytest.param((), id="budgets"),
+        pytest.param(("microrad.study.pointing_penalty",), id="with the study", marks=pytest.mark.endurance),
+    ],
+)
 def test_a_budget_as_text_loads_no_compiled_loops(loads):
     names = ", ".join(("sys", "microrad.report.links.budgets", *loads))
     code = f"import {names}; print('numba' in sys.modules)"
