@@ -49,6 +49,8 @@ def test_nothing_in_the_package_asks_the_network():
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
         loaded += re.findall(r"load\.timescale\((.*?)\)", text)
+        if not re.search(rf"\b(?:{'|'.join(ASKING)})\b", text):  # nothing to parse for
+            continue
         for node in ast.walk(ast.parse(text)):
             names = [each.name for each in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) and not node.level else []

@@ -14,8 +14,10 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[1] / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 STORIES = 8
-RUN_HERE = () if os.environ.get("MICRORAD_ENDURANCE") else NOTEBOOKS[1:]
-"""Those whose code is run in this process, which has all that they import; the site's build executes the others."""
+LONG = ("04", "08")
+"""Those that take long. What they call has examples of its own in test_public.py, and tests in loop/ and export/."""
+RUN_HERE = () if os.environ.get("MICRORAD_ENDURANCE") else [path for path in NOTEBOOKS if path.name[:2] not in LONG]
+"""Those whose code is run in this process, which has all that they import; in make endurance the site executes all."""
 
 _LIBRARIES = {"microrad", "numpy", "matplotlib"}  # what a plain install with the extra docs has
 _ARTICLE = "SPIE 11852, 118523B"

@@ -5,7 +5,6 @@ It ends in a comment, `<!-- promise: day-12 -->`, with the name of its page and 
 Each of its tests says `@pytest.mark.promise("day-12")`.
 """
 
-import ast
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -14,6 +13,7 @@ from site_pages.tables import table
 
 ROOT = Path(__file__).resolve().parents[2]
 
+_SHOWN = re.compile(r"(?m)^ *(?:@pytest\.mark\.promise\(([^)]*)\)|(?:async )?def (\w+)\()")
 _MARK = re.compile(r"[ \n]?<!-- promise: ([a-z]+(?:-[a-z]+)*-\d+) -->")
 _INTRODUCTION = """# What is promised, and what shows it
 
@@ -37,14 +37,14 @@ def shown() -> dict[str, list[str]]:
     """The tests that name each promise, as `file::test`."""
     found = defaultdict(list)
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
-        source = path.read_text(encoding="utf-8")
-        if "mark.promise(" not in source:
-            continue
-        for node in ast.walk(ast.parse(source)):
-            for mark in getattr(node, "decorator_list", ()):
-                if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "pytest.mark.promise":
-                    for name in mark.args:
-                        found[ast.literal_eval(name)].append(f"{path.relative_to(ROOT / 'tests')}::{node.name}")  # type: ignore[attr-defined]
+        names: list[str] = []
+        for promises, test in _SHOWN.findall(path.read_text(encoding="utf-8")):
+            if not test:
+                names += re.findall('"(.*?)"', promises)
+                continue
+            for name in names:
+                found[name].append(f"{path.relative_to(ROOT / 'tests')}::{test}")
+            names = []
     return dict(found)
 
 

@@ -364,7 +364,7 @@ def two_sizes(tmp_path_factory):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak of memory is in kB on Linux alone")
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", [pytest.param(k, marks=[] if k == "nc" else [pytest.mark.endurance]) for k in FORMATS])
 def test_memory_does_not_grow_with_the_number_of_rows(tmp_path, kind, two_sizes):
     """In one process: its peak is that of the larger one in the end."""
     target = str(tmp_path / f"rows.{kind}")

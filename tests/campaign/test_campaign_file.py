@@ -823,10 +823,11 @@ def test_draws_that_a_key_does_not_take_are_warned_of_with_their_share(tmp_path)
 
 
 def test_the_share_that_is_warned_of_is_that_of_rows_that_fail(tmp_path):
+    """Of those with the least power: above them no row fails that these do not."""
     c = loaded(tmp_path, beyond("5 W", runs=1024))
     builder, (columns, _) = MissionBuilder(c), sampling.rows(c, 0, 0, 1024)
     failed = 0
-    for watt in columns["communication.transmit_power"]:
+    for watt in np.sort(columns["communication.transmit_power"])[:200]:
         try:
             builder.mission(0, {"communication.transmit_power": float(watt)})
         except CampaignError:

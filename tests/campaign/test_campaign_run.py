@@ -118,8 +118,9 @@ def held(path, book):
 # --------------------------------------------------------------------------------------------------------------- kills
 @pytest.mark.promise("decisions-1", "readme-12")
 @pytest.mark.promise("campaigns-1", "campaigns-46", "campaigns-47")
+@pytest.mark.usefixtures("rows_here")
 def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
-    """Where there are few kills, the second one is of the other kind."""
+    """Where there are few kills, the first is that of a worker and the second that of the parent, which goes on."""
     path, campaign, undisturbed = long
     book, dice = tmp_path / "k.ledger", random.Random(1)
     dead, kills, parents = [], 0, 0
@@ -135,7 +136,7 @@ def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
             until(lambda p=process: p.poll() is not None or children(p.pid), "a worker or the end")
         any_moment(dice, 1.0)
         workers = children(process.pid)
-        of_parent = dice.random() < 0.5 if OFTEN else not kills
+        of_parent = dice.random() < 0.5 if OFTEN else bool(kills)
         victim = process.pid if of_parent or not workers else dice.choice(workers)
         fits = OFTEN or of_parent == (victim == process.pid)
         if kills < KILLS and fits and process.poll() is None and kill(victim):
@@ -147,7 +148,8 @@ def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
         elif kills >= KILLS:
             process.communicate(timeout=HANG_S)
     assert kills == KILLS and 0 < parents < KILLS
-    assert call("campaign", "resume", book).code in (0, 1)
+    until(lambda: not book.exists() or not is_written(book), "the lock of a killed campaign")
+    assert call("campaign", *(("resume", book) if book.exists() else command)).code in (0, 1)
     assert table(book) == undisturbed
     whole(book, campaign)
     assert gone(*dead)
@@ -239,7 +241,7 @@ GRID = """
 
 
 @pytest.mark.promise("decisions-1", "readme-12")
-@pytest.mark.promise("campaigns-3", "campaigns-19")
+@pytest.mark.promise("campaigns-3", "campaigns-19", "campaigns-51")
 @pytest.mark.parametrize(
     "means",
     [
@@ -595,13 +597,13 @@ def test_a_set_of_latin_or_sobol_rows_is_one_draw_of_the_mean(tmp_path, sampling
 @pytest.mark.promise("campaigns-7", "campaigns-29")
 @pytest.mark.usefixtures("rows_here")
 def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
-    path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.02 dB", most=20_000))
+    path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.03 dB", most=20_000))
     found = summarise_campaign(begun(tmp_path, path))
     median = found.cells[0].outputs["margin"].quantiles[0.5]
     campaign = load_campaign(path)
     rounds = planned(campaign).rounds
     assert found.progress.state == "complete" and found.cells[0].rows in rounds[:-1]
-    assert (median.high - median.low) / 2.0 <= 0.02
+    assert (median.high - median.low) / 2.0 <= 0.03
     before = rounds[rounds.index(found.cells[0].rows) - 1] if found.cells[0].rows > rounds[0] else None
     if before is not None:
         with Ledger.open(tmp_path / "campaign.ledger", write=False) as book:
@@ -630,7 +632,7 @@ output = "radius"
 quantile = 0.99
 half_width = "{width}"
 confidence = 0.99
-at_most = 1024
+at_most = 512
 """
 
 
@@ -679,7 +681,13 @@ class _Gone(Here):
 
 
 @pytest.mark.promise("campaigns-46", "campaigns-47", "campaigns-53", "campaigns-56")
-@pytest.mark.parametrize("said", [_Gone.said, "the scheduler at tcp://head:1 had no worker for 60 s"])
+@pytest.mark.parametrize(
+    "said",
+    [
+        _Gone.said,
+        pytest.param("the scheduler at tcp://head:1 had no worker for 60 s", marks=pytest.mark.endurance),
+    ],
+)
 def test_an_engine_that_goes_away_leaves_what_is_done_and_another_goes_on(short, tmp_path, monkeypatch, said):
     path, _, undisturbed = short
     monkeypatch.setattr(_Gone, "said", said)

@@ -185,7 +185,7 @@ def mixed(seed: int, draws: int, aim: float) -> tuple[Floats, Floats]:
     return np.concatenate([np.hypot(*unit) for unit, _ in found]), np.concatenate([weight for _, weight in found])
 
 
-@pytest.mark.parametrize("draws", [64, 256])
+@pytest.mark.parametrize("draws", [64, pytest.param(256, marks=pytest.mark.endurance)])
 def test_intervals_of_weighted_draws_hold_at_all_radii(draws: int) -> None:
     """Also where the weighted share is near 1, and those of the probability beyond a radius."""
     probabilities = (0.9, 0.5, 0.1, 1e-3, 1e-6)
@@ -287,6 +287,7 @@ def slow(tmp_path_factory: pytest.TempPathFactory) -> Slow:
     return Slow(tmp_path_factory.mktemp("slow"))
 
 
+@pytest.mark.endurance
 @pytest.mark.promise("campaigns-28", "campaigns-32")
 def test_interval_of_a_loops_tail_holds_rayleighs_quantile(slow: Slow) -> None:
     """64 rows of 4 s each; some 50 excursions are in each repetition."""

@@ -155,6 +155,7 @@ def test_a_rare_radius_of_the_loop(folder):
     assert below("tail.toml") in " ".join(ran.out.split())
 
 
+@pytest.mark.endurance
 @pytest.mark.promise("campaigns-40")
 def test_the_optimum_keeps_the_limit_on_fresh_rows(folder):
     found = command("microrad", "campaign", "optimise", "aperture.toml")
@@ -222,7 +223,7 @@ def free_port():
 
 @pytest.fixture
 def cluster_commands():
-    """The page's commands of a cluster, on a free port, with one worker; the scheduler and its workers run."""
+    """The page's commands of a cluster, on a free port; the scheduler and its workers run."""
     port = free_port()
     scheduler, worker, begin = (
         [word.replace("8786", port) for word in words]
@@ -230,7 +231,6 @@ def cluster_commands():
         if words[0] == "dask" or "--scheduler" in words
     )
     assert worker[-2:] == ["--nworkers", "2"]
-    worker[-1] = "2" if os.environ.get("MICRORAD_ENDURANCE") else "1"
     dask = shutil.which("dask", path=str(Path(sys.executable).parent)) or shutil.which("dask")
     assert dask, "distributed brings dask"
     begun = [
@@ -251,6 +251,7 @@ def cluster_commands():
             process.wait(HANG_S)
 
 
+@pytest.mark.endurance
 @pytest.mark.promise("decisions-1", "readme-12")
 @pytest.mark.promise("campaigns-3", "campaigns-51")
 def test_a_cluster_gives_the_same_bytes(folder, cluster_commands, monkeypatch):

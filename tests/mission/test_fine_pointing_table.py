@@ -578,12 +578,14 @@ def test_a_rate_that_divides_is_taken_and_is_a_sensors(load, rate, readings):
     assert (made.every, made.delay_steps) == (readings, 1)
 
 
+OWN = load_mission(SHIPPED).mission.fine_pointing
+
+
 @settings(deadline=None)
 @given(st.floats(1e-3, 6e3))
 def test_a_rate_is_refused_exactly_where_a_sensor_refuses_it(rate_hz):
-    table = load_mission(SHIPPED).mission.fine_pointing
-    sensed = table.optical_sensor.model_copy(update={"rate_hz": rate_hz})
-    told = list(table.model_copy(update={"optical_sensor": sensed}).problems())
+    sensed = OWN.optical_sensor.model_copy(update={"rate_hz": rate_hz})
+    told = list(OWN.model_copy(update={"optical_sensor": sensed}).problems())
     clocks = {"rate_hz": rate_hz, "delay_s": 0.0, "control_rate_hz": 5e3, "plant_step_s": 40e-6}
     try:
         sensor.optical_sensor(1e-6, 2e-3, **clocks)

@@ -578,15 +578,28 @@ def test_each_quantity_of_a_mission_refuses_another_kind_of_unit():
     assert len(tried) > 100
 
 
+STRIDE = 20
+
+
 @pytest.mark.promise("decisions-1")
 def test_no_quantity_of_a_mission_has_a_default(refuse):
-    for key in load_mission(PAPER).sources:
-        found = [fault.key for fault in refuse(edited(key, None)).faults]
+    """Many keys at once that stand far from each other; what is not told beside the others is so by itself."""
+
+    def told(text, key):
         # a linear part lacks one of its two forms, so that its table is named
         form = key in ("mirror.linear.numerator", "mirror.linear.denominator")
         # and an orbit lacks its node, however that is given
         named = "mirror.linear" if form else key.replace("local_time", "node")
-        assert named in found, key
+        return named in [fault.key for fault in refuse(text).faults]
+
+    every, place = list(load_mission(PAPER).sources), {s.key: s.line - 1 for s in scan(TEXT) if s.kind == "key"}
+    for first in range(STRIDE):
+        lines = TEXT.split("\n")
+        for key in every[first::STRIDE]:
+            lines[place[key]] = ""
+        found = [fault.key for fault in refuse("\n".join(lines)).faults]
+        alone = [key for key in every[first::STRIDE] if key not in found]
+        assert [key for key in alone if not told(edited(key, None), key)] == []
 
 
 def test_a_missing_table_is_one_fault(refuse):
