@@ -14,6 +14,7 @@ import designs
 from export.test_export_fixed import Compiled, held_extremes
 from export.test_export_flight import (  # noqa: F401
     EXACT,
+    OFTEN,
     Code,
     bench,
     difference,
@@ -38,6 +39,8 @@ from microrad.loop.pointing_loop.loop import with_adaptation
 from microrad.mirror.hysteresis import NO_CREEP
 
 SAMPLES = 4000
+BOUNDED = 4000 if OFTEN else 500
+"""Samples of a run whose bound of rounding is taken: that is 64 runs of them."""
 
 
 def chosen_to_learn(resolution_v=0.0, learns=True, creep=NO_CREEP, **changes):
@@ -100,9 +103,9 @@ def no_learning(settings):
 
 
 @cache
-def bounded(**which):
+def bounded(samples=BOUNDED, **which):
     """A controller with its run, and the bound of single precision there."""
-    of, vectors = learning(**which)
+    of, vectors = learning(samples=samples, **which)
     return of, vectors, rounding_bound(of, sections(of), vectors)
 
 
@@ -130,7 +133,7 @@ def test_single_precision_stays_within_its_bound_while_it_learns(tmp_path):
     assert numbers["bound_v"] == pytest.approx(bound.command_v, rel=1e-5)
     assert "6 times the rms of 64 runs with random roundings" in bound.words
     joined = " ".join(code.files["flown.h"].replace("\n *", " ").split())
-    assert f"within {bound.command_v:.3g} V of double precision over {SAMPLES} recorded samples" in joined
+    assert f"within {bound.command_v:.3g} V of double precision over {BOUNDED} recorded samples" in joined
     assert "It is 6 times the rms of what 64 runs with random roundings are off." in joined
 
 
@@ -151,9 +154,9 @@ KINDS = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_bound_holds_with(kind, tmp_path):
-    of, vectors, bound = bounded(samples=1500, **KINDS[kind])
+    of, vectors, bound = bounded(samples=600, **KINDS[kind])
     vectors = c_code.within_limits(of, vectors)
-    assert (vectors.saturated > 100) == (kind == "clipped commands")
+    assert (vectors.saturated > 40) == (kind == "clipped commands")
     _, found = stray(tmp_path, of, vectors, bound)
     assert 0.0 < found <= bound.command_v <= (2.01 * of.resolution_v or 1e-4)
 
@@ -161,9 +164,10 @@ def test_the_bound_holds_with(kind, tmp_path):
 def test_the_bound_is_that_of_every_sample(tmp_path):
     """Ahead of the converter and the clip; it holds from the first sample on, not by its largest alone."""
     of, vectors = learning()
-    bound = errors_before_converter(of, sections(of), vectors)
+    first = replace(vectors, inputs=vectors.inputs[:BOUNDED], commands=vectors.commands[:BOUNDED])
+    bound = errors_before_converter(of, sections(of), first)
     off = np.abs(Code(tmp_path, of, "single").replay(vectors.inputs) - vectors.commands)
-    assert np.all(off <= bound + 4.0 * UNIT * np.abs(vectors.commands))
+    assert np.all(off[:BOUNDED] <= bound + 4.0 * UNIT * np.abs(first.commands))
     assert np.max(off[2000:]) > 2.0 * np.max(off[:500])  # it adds up what it learns from
 
 
@@ -186,8 +190,15 @@ def test_roundings_are_as_large_as_they_can_be_and_up_as_often_as_down():
 @cache
 def whole():
     """A controller with a converter, its run, and it in fixed point."""
-    of, vectors = learning(0.305e-3)
+    of, vectors = learning(0.305e-3, samples=BOUNDED)
     return of, c_code.within_limits(of, vectors), quantised(of, sections(of), vectors)
+
+
+@cache
+def free():
+    """The same without a converter: a command is a word."""
+    of, vectors = learning(samples=BOUNDED)
+    return of, vectors, quantised(of, sections(of), vectors)
 
 
 @pytest.mark.promise("export-18", "export-20")
@@ -196,13 +207,13 @@ def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     of, vectors, fixed = whole()
     r = fixed.report
     print(f"whole numbers add {r.error_v:.2g} V, what learns in single precision up to {r.inverse_v:.2g} V")
-    assert 1e-8 < r.error_v < 1e-5 < r.inverse_v < 1e-4
+    assert 1e-8 < r.error_v < 1e-6 < r.inverse_v < 1e-4
     assert r.bound_v <= 2.01 * of.resolution_v
     assert "The inverse, in single precision, adds up to" in quantisation_text(fixed)
     for file, text in fixed_code(of, sections(of), fixed, "flown").items():
         (tmp_path / file).write_text(text)
     (tmp_path / "vectors.csv").write_text(c_code.vectors_text(of, vectors))
-    for target in ("check", "sanitized"):
+    for target in ("check", "sanitized") if OFTEN else ("sanitized",):
         command = ["make", "-s", target, "CC=gcc", "PASSES=0", *(["CFLAGS=-std=c99 -O1"] if target != "check" else [])]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         told = {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines() if len(line.split()) == 2}
@@ -212,12 +223,12 @@ def test_in_fixed_point_it_stays_within_its_report(tmp_path):
 
 
 def test_in_fixed_point_it_stays_near_without_a_converter(tmp_path):
-    """A command is a word: what it is off is not hidden by a count."""
-    of, vectors = learning()
-    fixed = quantised(of, sections(of), replace(vectors, inputs=vectors.inputs[:4000]))
-    read = readings(fixed, vectors.inputs[:4000])
-    found, _ = Compiled(of, sections(of), fixed, tmp_path).run(read, np.zeros((4000, 2), int), "steps")
-    off = np.max(np.abs(found * 2.0 ** -fixed.output_scale[0] - vectors.commands[:4000]))
+    """What it is off is not hidden by a count."""
+    of, vectors, fixed = free()
+    read, count = readings(fixed, vectors.inputs), np.exp2(-np.array(fixed.input_scale))
+    assert np.all(np.abs(count * read - vectors.inputs) <= 0.5 * count * (1.0 + 1e-9))
+    found, _ = Compiled(of, sections(of), fixed, tmp_path).run(read, np.zeros((BOUNDED, 2), int), "steps")
+    off = np.max(np.abs(found * 2.0 ** -fixed.output_scale[0] - vectors.commands))
     print(f"strays by {off:.2g} V, and its bound is {fixed.report.bound_v:.2g} V")
     assert 0.03 * fixed.report.bound_v < off < fixed.report.bound_v < 1e-4
 
@@ -237,10 +248,10 @@ def test_no_readings_take_it_beyond_its_limits_in_fixed_point(tmp_path):
 
 
 @pytest.mark.promise("export-18")
-@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("precision", [pytest.param("double", marks=pytest.mark.endurance), "single"])
 def test_garbage_does_not_take_it_beyond_its_limits_nor_what_it_learns(precision, tmp_path):
     of, vectors = learning(0.305e-3)
-    vectors = replace(vectors, inputs=vectors.inputs[:2500], commands=vectors.commands[:2500])
+    vectors = replace(vectors, inputs=vectors.inputs[:800], commands=vectors.commands[:800])
     code = Code(tmp_path, of, precision)
     bad = garbage_stays_within_limits(code, of, vectors)
     state = code.begin()
@@ -288,7 +299,7 @@ def with_cycle(settings, samples):
 @pytest.mark.promise("export-20")
 def test_in_fixed_point_it_costs_what_learns_beside():
     of, _, fixed = whole()
-    (frozen, vectors) = learning(0.305e-3, learns=False, samples=3000)
+    (frozen, vectors) = learning(0.305e-3, learns=False, samples=500)
     without = fixed_operations(frozen, quantised(frozen, sections(frozen), vectors))
     found = fixed_operations(of, fixed)
     assert found.conversions == without.conversions + 2  # the readings' errors
@@ -306,10 +317,9 @@ def test_the_header_says_what_learns():
 
 def test_the_bound_of_a_command_in_fixed_point_adds_what_either_part_is_off():
     """Whole numbers and the inverse in single precision; there is no converter behind them."""
-    of, vectors, _ = whole()
-    free = replace(of, resolution_v=0.0)
-    r = quantised(free, sections(free), vectors).report
-    larger, both = behind_converter(free, np.array([max(r.error_v, r.inverse_v), r.error_v + r.inverse_v]))
+    of, _, fixed = free()
+    r = fixed.report
+    larger, both = behind_converter(of, np.array([max(r.error_v, r.inverse_v), r.error_v + r.inverse_v]))
     assert (1.0 + 1e-6) * larger < r.bound_v <= (1.0 + 1e-9) * both
 
 
@@ -396,10 +406,10 @@ def test_the_runs_of_a_bound_are_those_in_double_where_nothing_is_rounded(monkey
     monkeypatch.setattr(learning_rounding, "RUNS", 2)
     monkeypatch.setattr(learning_rounding, "_in_single", lambda x: np.asarray(x, dtype=float))
     monkeypatch.setattr(learning_rounding, "laws", lambda law, number: learning_run.laws(law))
-    form, inputs = sections(of), vectors.inputs[:900]
+    form, inputs = sections(of), vectors.inputs[:400]
     run = double_run.run_in_double(of, form, inputs)
     found = learning_rounding.learning_errors(of, form, run, None if beside else inputs)
-    assert found.shape == (900, 2)
+    assert found.shape == (400, 2)
     assert np.max(found) < 1e-9 * np.max(np.abs(run.free))
 
 

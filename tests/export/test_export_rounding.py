@@ -25,7 +25,7 @@ from microrad.loop.pointing_loop.kernel_arrays import forward_arrays
 from microrad.loop.pointing_loop.loop import ForwardHysteresis
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 
-SAMPLES = 2000
+SAMPLES = 1000
 f = np.float32
 ONE, TOLERANCE, TRIALS = f(1.0), f(1e-6), 256
 

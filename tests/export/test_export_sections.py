@@ -24,7 +24,7 @@ from microrad.export.linear_part.sections import MODAL, TRIANGULAR, sections
 from microrad.export.records import ExportError, FlightController, Origin, Signal
 
 PERIOD = 1e-3
-RECORDED, LONG = 2000, 30_000 if os.environ.get("MICRORAD_ENDURANCE") else 10_000
+RECORDED, LONG = 1000, 30_000 if os.environ.get("MICRORAD_ENDURANCE") else 4000
 WIDE = np.finfo(np.longdouble).eps < 1e-18  # the form is refined at a precision that some machines do not have
 FLYING = ("PI + inverse", "PI + inverse in series", "LQG", "disturbance observer", "PID")
 

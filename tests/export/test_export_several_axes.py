@@ -21,7 +21,9 @@ def here(folder):
 @pytest.mark.promise("mirror-file-30")
 @pytest.mark.promise("export-32")
 @pytest.mark.skipif(build.compiler() is None, reason="no C compiler")
-@pytest.mark.parametrize(("fmi", "first"), [("2.0", "command_v[1]"), ("3.0", "command_v")])
+@pytest.mark.parametrize(
+    ("fmi", "first"), [("2.0", "command_v[1]"), pytest.param("3.0", "command_v", marks=pytest.mark.endurance)]
+)
 def test_a_unit_of_all_axes_is_written(here, call, fmi, first):
     done = call("export", "fmu", "mission.toml", "--mirror", "two-axes.toml", "--fmi", fmi)
     assert done.code == 0, done.err

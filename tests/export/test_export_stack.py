@@ -95,7 +95,7 @@ def test_a_step_takes_as_much_of_a_painted_stack_as_is_stated(tmp_path, monkeypa
     monkeypatch.setenv("CC", "gcc")
     chosen = designs.chosen("resonant damping")
     of = choice.flight_controller(chosen)
-    files = fixed_code(of, sections(of), quantised(of, sections(of), choice.vectors(chosen, 2000)), "whole")
+    files = fixed_code(of, sections(of), quantised(of, sections(of), choice.vectors(chosen, 300)), "whole")
     for file, text in {**files, "painted.c": PAINTED}.items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     found = stack.stack_use(tmp_path, ["whole_fixed.c"], "whole_fixed_step")

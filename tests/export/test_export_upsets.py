@@ -1,5 +1,6 @@
 """Flight code whose state upsets change: every bit is turned, at many moments of a run, alone and one upon another."""
 
+import os
 import shutil
 import subprocess
 from dataclasses import replace
@@ -14,7 +15,7 @@ from microrad.export.flight import c_code, fixed
 from microrad.export.flight.rounding import RoundingBound
 from microrad.export.linear_part.sections import sections
 
-FLIPS = 10_000
+FLIPS = 10_000 if os.environ.get("MICRORAD_ENDURANCE") else 4000
 BEHIND = 6  # samples that are looked at behind each flip
 FLAGS = ["-std=c99", "-O1", "-g", "-fsanitize=undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 BOUND = RoundingBound(command_v=1e-3, samples=1, per_sample_v=0.0, words="For tests.")
@@ -99,9 +100,14 @@ FLOWN = [
     (LEARNS, "single"),
     *zip(PAIRS, ("single", "double", "single"), strict=True),
 ]
-FLOWN += [
-    pytest.param(name, "double" if precision == "single" else "single", marks=pytest.mark.endurance)
-    for name, precision in FLOWN
+PARTS = ("LQG", "exponent 2 without a limit of rate, plays that creep")
+"""What has no part of its state that another one does not have, too."""
+FLOWN = [
+    *(pytest.param(*each, marks=[pytest.mark.endurance] if each[0] in PARTS else []) for each in FLOWN),
+    *(
+        pytest.param(name, "double" if precision == "single" else "single", marks=pytest.mark.endurance)
+        for name, precision in FLOWN
+    ),
 ]
 """Each code in one precision, and in the other one where there is time."""
 
@@ -109,7 +115,7 @@ FLOWN += [
 def flown(name):
     """A controller by its name, or with the inverse of a pair of models, and a recorded run."""
     if name == LEARNS:
-        return learning(0.305e-3, samples=3000)
+        return learning(0.305e-3, samples=300)
     return pair(PAIRS[name]) if name in PAIRS else designs.flown(name, 300)
 
 
@@ -129,7 +135,9 @@ def test_no_bit_of_the_state_takes_a_command_beyond_the_limits(tmp_path, name, p
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
-@pytest.mark.parametrize("name", ["PI + inverse", "LQG", LEARNS])
+@pytest.mark.parametrize(
+    "name", ["PI + inverse", *(pytest.param(n, marks=pytest.mark.endurance) for n in ("LQG", LEARNS))]
+)
 def test_nor_in_fixed_point_and_nothing_overflows(tmp_path, name):
     of, run = flown(name)
     form = sections(of)

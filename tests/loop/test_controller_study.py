@@ -245,6 +245,7 @@ def test_every_design_meets_its_margin_and_none_beats_the_optimum(scene, tuned):
 
 
 @pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+@pytest.mark.endurance
 def test_a_part_that_is_kept_is_tuned_in_two_processes():
     code = """
 import os, traceback
@@ -289,6 +290,7 @@ def test_theory_allows_no_20_percent_in_the_shipped_scenario(scene, tuned):
 
 @pytest.mark.promise("choose-7")
 @pytest.mark.promise("readme-11")
+@pytest.mark.endurance
 def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_path):
     """Lines of 4.5 and 1.3 µrad at 80 and 160 Hz: simulated without hysteresis, as the linear theory says."""
     changed = edited_file(tmp_path, ("\n[fine_pointing.body]", WHEELS))
@@ -396,6 +398,8 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
 @pytest.mark.parametrize("name", [pytest.param(controller_study.BASELINE, marks=pytest.mark.endurance), "PI + inverse"])
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
+    table = file.mission.fine_pointing.model_copy(update={"runs": 3})
+    scene = replace(scene, table=table)
     (verified,) = controller_study.verify(scene, [by_name(tuned[0])[name]])
     simulate, simulated = ensemble.simulate_cases, []
 
@@ -406,7 +410,7 @@ def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, 
     monkeypatch.setattr(ensemble, "simulate_cases", counted)
     budget = controller_study.error_budget(scene, verified)
     assert len(simulated) == len(budget.parts) + len(budget.differences) - 1
-    span, runs = results.span(file.mission.fine_pointing), file.mission.fine_pointing.runs
+    span, runs = results.span(table), table.runs
     straight = parts.without(scene.loop, parts.HYSTERESIS)
     full, together = (
         ensemble.simulate(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
@@ -515,9 +519,10 @@ def test_a_sine_is_tracked_better_with_the_inverse(scene, file, tuned):
 @pytest.mark.promise("gallery-9", "gallery-16")
 @pytest.mark.promise("sampled-loop-11")
 @pytest.mark.promise("pointing-11", "sampled-loop-11")
-def test_an_uncertain_mirror_is_tuned_for_its_draws(tmp_path):
+def test_an_uncertain_mirror_is_tuned_for_its_draws(tmp_path, monkeypatch):
     """A gain known to 10 %: the margin holds for each drawn mirror, at a price."""
     changed = edited_file(tmp_path, ("\n[mirror.comparison.bouc_wen]", UNCERTAIN))
+    monkeypatch.setattr(designs, "DRAWS", 3)
     scene, m = scene_of(changed), changed.mission
     plants = designs.plants(scene, seed=1)
     assert len(plants) == 1 + designs.DRAWS
@@ -544,7 +549,7 @@ def test_a_mission_without_the_table_has_no_scene(tmp_path):
 def test_a_margin_out_of_reach_is_refused_with_the_best_there_is(tmp_path):
     changed = edited_file(tmp_path, ("modulus_margin = 0.5 ", "modulus_margin = 0.999 "))
     with pytest.raises(ValueError, match=r"modulus margin"):
-        controller_study.design(scene_of(changed))
+        controller_study.design(scene_of(changed), only=("PI",))
 
 
 @pytest.mark.promise("pointing-3", "pointing-63")

@@ -64,10 +64,15 @@ CASES = {
     "fed back": (FED_BACK, FAST, 1 / 25_000, 400, with_reversals),
     "cascade, rising drive": (CASCADE, HALF_SINE, 1 / 25_000, 240, without_reversals),
 }
+PARTS = ("cascade", "cascade, exponent 2")
+"""A mirror whose order is seen without reversals, too, and one that differs from it by a power."""
 
 
 @pytest.mark.promise("hysteresis-21")
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, id=name, marks=pytest.mark.endurance if name in PARTS else []) for name, case in CASES.items()],
+)
 def test_the_step_is_of_second_order(case):
     """Two, by a fit over many steps.
 

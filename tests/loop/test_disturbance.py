@@ -406,12 +406,12 @@ def test_a_table_of_a_first_order_spectrum_is_fitted_by_one_pole():
 
 
 def test_a_measured_spectrum_with_a_resonance_is_fitted_within_its_scatter():
-    f = np.arange(0.0, 400.0, 0.1)
+    f = np.arange(0.0, 120.0, 0.1)
     scatter = philox(5).gamma(60, 1 / 60, f.size)  # a Welch estimate from 60 segments
     rows = measured_spectrum(f) * scatter
     rows[0] = 0.0  # the mean was taken off
     fit = fit_table(f, rows, convention="per-axis", name="bench", source="accelerometer")
-    probe = np.array([0.3, 1.0, 5.0, 20.0, 36.0, 37.0, 38.0, 60.0, 200.0])
+    probe = np.array([0.3, 1.0, 5.0, 20.0, 36.0, 37.0, 38.0, 60.0, 110.0])
     assert np.max(np.abs(10 * np.log10(psd(fit.disturbance, probe) / measured_spectrum(probe)))) < 1.0
     assert_allclose(fit.achieved_rms_rad, fit.requested_rms_rad, rtol=0.05)
     assert 0.0 < abs(fit.worst_db) < 2.0
@@ -442,7 +442,7 @@ def test_a_table_whose_rms_the_fit_misses_is_refused():
 
 
 def test_a_table_with_a_narrow_line_is_refused_with_its_frequency():
-    f = np.arange(0.1, 200, 0.1)
+    f = np.arange(0.1, 100, 0.1)
     rows = measured_spectrum(f)
     rows[829] *= 1e5
     with pytest.raises(ValueError, match=r"dB below the table near 8\d\.?\d* Hz.*give narrow lines as spectral lines"):
@@ -1343,7 +1343,10 @@ def test_variances_of_least_relative_error_are_those_of_the_sum_the_strongest_fi
     assert 900.0 not in [t.freq_hz for t in absent] or len(absent) == 3
 
 
-@pytest.mark.parametrize(("states", "has"), [(1, 1), (3, 3), (5, 5), (None, 5), (11, 11), (12, 12)])
+@pytest.mark.parametrize(
+    ("states", "has"),
+    [*(pytest.param(n, n, marks=pytest.mark.endurance) for n in (1, 5, 11)), (3, 3), (None, 5), (12, 12)],
+)
 def test_a_fit_is_brought_to_the_states_that_are_asked_for_or_to_those_that_its_spectrum_has(states, has):
     f = np.geomspace(0.1, 100.0, 120)
     samples = terms.table_samples(f, sum(terms.term_density(t, f) for t in SUM))
@@ -1777,7 +1780,7 @@ def test_what_a_fit_is_given_is_left_as_it_is():
     edges, rms = np.array([0.0, 1.0, 10.0]), np.array([3e-6, 2e-6])
     fit_bands(edges, rms, convention="radial")
     assert (edges.tolist(), rms.tolist()) == ([0.0, 1.0, 10.0], [3e-6, 2e-6])
-    freq = np.append(0.0, np.geomspace(0.1, 100.0, 30))
+    freq = np.append(0.0, np.geomspace(0.1, 100.0, 12))
     density = 1e-12 / (1.0 + freq**2)
     kept = freq.copy(), density.copy()
     fit_table(freq, density, convention="radial")

@@ -314,8 +314,8 @@ def test_margins_end_where_dense_computation_and_poles_say(name):
         return L(np.exp(2j * math.pi * np.asarray(freq_hz) * PERIOD))
 
     def least(of):
-        """Smallest value on 6000 frequencies, then three times on 201 around the best one."""
-        freq_hz = np.geomspace(0.01, 2500.0, 6000)
+        """Smallest value on 2000 frequencies, then three times on 201 around the best one."""
+        freq_hz = np.geomspace(0.01, 2500.0, 2000)
         for _ in range(4):
             size = of(at(freq_hz))
             best = int(np.argmin(size))
@@ -511,8 +511,9 @@ def test_the_multiloop_margin_is_the_least_pair_of_changes_that_makes_the_loop_s
         found = analysis.multiloop_disk_margin(np.array([1.0]), L[None]).disk
         M = np.linalg.inv(np.eye(2) + L) - 0.5 * np.eye(2)
         phases = np.exp(1j * np.linspace(0, 2 * math.pi, 4001))
-        sizes = [np.max(np.abs(np.linalg.eigvals(np.diag([1.0, u]) @ M))) for u in phases]
-        assert found == near(1.0 / max(sizes), rel=1e-5)
+        turned = np.stack([np.broadcast_to(M[0], (phases.size, 2)), phases[:, None] * M[1]], axis=1)
+        sizes = np.max(np.abs(np.linalg.eigvals(turned)), axis=1)
+        assert found == near(1.0 / np.max(sizes), rel=1e-5)
         at = np.diag([1.0, phases[np.argmax(sizes)]]) @ M
         u = np.array([1.0, phases[np.argmax(sizes)]]) * np.exp(-1j * np.angle(_largest(np.linalg.eigvals(at))))
         for factor, singular in ((1.0, True), (0.8, False)):
@@ -622,7 +623,7 @@ def test_each_margin_of_a_loop_in_closed_form_with_crossings_on_both_sides():
         f = np.asarray(freq_hz)
         return 3.0 / ((1 + 1j * f / 5.0) * (1 + 1j * f / 90.0)) * np.exp(-2j * np.pi * f * 4e-3)
 
-    dense = np.linspace(1e-3, 400.0, 4_000_001)
+    dense = np.linspace(1e-3, 400.0, 1_000_001)
     L = response(dense)
     found = analysis.margins_of(response, np.geomspace(1e-3, 400.0, 700))
     cross = dense[np.argmax(np.abs(L) < 1.0)]

@@ -224,7 +224,9 @@ def following_error(loop, controller):
 
 
 @pytest.mark.promise("pointing-22")
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", [pytest.param(m, marks=pytest.mark.endurance if "exponent" in m else []) for m in MODELS]
+)
 def test_without_feedback_the_mirror_follows_the_filtered_reference_with_the_inverse(model):
     """At least these factors nearer than with the slow gain; plays to below 0.1 % of the stroke, Bouc-Wen to 1.5 %."""
     loop = loop_of(model)

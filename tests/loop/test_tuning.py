@@ -1,6 +1,7 @@
 """Tuning against brute force over exact variances and margins, and what it says when it cannot."""
 
 import math
+import os
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -352,11 +353,12 @@ def test_a_search_that_ends_somewhere_leaves_the_contained_controller(monkeypatc
 
 def test_the_notch_is_sought_beside_the_pi_and_far_from_it():
     """The best is a wide notch beside the tuned PI on the one plant, far from it on the other; LQG is the floor."""
-    shipped = load_mission(SHIPPED)
-    seed = shipped.mission.fine_pointing.seed
-    paper = designs.plants(scene_of(shipped), seed)
-    wanted = Specification(shipped.mission.fine_pointing.modulus_margin)
-    assert 1.0715e-6 < tuning.tune(classical.PI_NOTCH, paper, wanted, seed=seed).mean_rms_rad < 1.0730e-6
+    if os.environ.get("MICRORAD_ENDURANCE"):
+        shipped = load_mission(SHIPPED)
+        seed = shipped.mission.fine_pointing.seed
+        paper = designs.plants(scene_of(shipped), seed)
+        wanted = Specification(shipped.mission.fine_pointing.modulus_margin)
+        assert 1.0715e-6 < tuning.tune(classical.PI_NOTCH, paper, wanted, seed=seed).mean_rms_rad < 1.0730e-6
     assert 1.0259e-6 < tuning.tune(classical.PI_NOTCH, [PLAIN], HALF, seed=1).mean_rms_rad < 1.0269e-6
 
 
@@ -372,6 +374,7 @@ def test_the_points_of_a_slope_lie_within_the_bounds(x, node):
         assert points[2] == pytest.approx(x, abs=1e-12)
 
 
+@pytest.mark.endurance
 def test_an_optimum_beside_a_kink_is_the_same_from_every_start():
     """On this mirror the margin's constraint passes from one dip of |1 + L| to another beside the optimum."""
     soft = load_mission(SHIPPED, Path("docs/gallery/long-stroke.toml"))

@@ -97,14 +97,16 @@ def test_the_worst_corner_is_that_of_a_scan_by_hand(file):
 
 @pytest.mark.promise("pointing-73")
 @pytest.mark.parametrize(
-    ("family", "values"), [(control.PI, (60.0, 1500.0)), (control.RESONANT_DAMPING, None)], ids=["optical", "both"]
+    ("family", "values"),
+    [pytest.param(control.PI, (60.0, 1500.0), marks=pytest.mark.endurance), (control.RESONANT_DAMPING, None)],
+    ids=["optical", "both"],
 )
 def test_many_mirrors_at_once_have_the_figures_of_each_by_itself(file, family, values):
     if values is None:
         parameters = family.parameters(design_plant(scene_of(file).axis))
         values = [p.least * (p.most / p.least) ** 0.3 if p.log else 0.5 * (p.least + p.most) for p in parameters]
     subject, axis = subject_of(file, family, values)
-    drawn = subject.known.drawn(20, 5)
+    drawn = subject.known.drawn(6, 5)
     found = subject.figures(drawn, INDICES, 1)
     for (mirror, _), rms, modulus in zip(drawn, found.rms_rad, found.modulus, strict=True):
         expected, margin = by_itself(subject, axis, mirror)
@@ -133,7 +135,7 @@ def two_axes():
 @pytest.mark.promise("pointing-73")
 def test_mirrors_of_two_axes_have_the_least_singular_value_of_the_whole(two_axes):
     subject, both = two_axes
-    drawn = subject.known.drawn(20, 5)
+    drawn = subject.known.drawn(6, 5)
     found = subject.figures(drawn, (APE,), 1)
     to_drives = decoupling(subject.theory)
     for (mirror, _), rms, modulus in zip(drawn, found.rms_rad, found.modulus, strict=True):
@@ -184,6 +186,7 @@ def test_a_sensor_slower_than_the_control_counts_as_in_a_design(file):
 
 
 @pytest.mark.promise("pointing-75")
+@pytest.mark.endurance
 def test_the_benchmark_prints_how_long_two_thousand_mirrors_take(monkeypatch, capsys):
     bench, told = benchmark("worst_case"), []
     monkeypatch.setattr(bench, "tell", lambda what, do: told.append(what))  # each a command in a process of its own
