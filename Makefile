@@ -44,8 +44,11 @@ $(VENV)/.compiled: $(VENV)/.test scripts/compile_kernels.py $(wildcard src/micro
 numbers: $(VENV)/.test
 	$(BIN)/python scripts/numbers check
 
+# Assertions as they stand: to rewrite those of all files takes each process half a minute. What fails runs once more and
+# shows its values.
 unit: $(VENV)/.test
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10 --assert plain || \
+	  { $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; exit 1; }
 
 # The tests, and what functions return inside of them against reference/tests: a minute more. Before and behind a change that
 # is meant to move nothing.

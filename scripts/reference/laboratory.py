@@ -842,9 +842,9 @@ CASES: Mapping[str, Case] = {
     "lab-fitted": Case(fitted),
     "lab-static": Case(static),
     "lab-whole": Case(whole),
-    "lab-axes": Case(axes),
+    "lab-axes": Case(axes, quick=False),
     "lab-bench": Case(bench),
     "lab-formats": Case(formats),
-    "lab-import": Case(imported),
+    "lab-import": Case(imported, quick=False),
 }
 """All of them; a file reference/told/NAME.txt each."""

@@ -1033,7 +1033,7 @@ CASES: Mapping[str, Case] = {
     "export-refused": Case(refused_exports),
     "orbits": Case(orbits, quick=False),
     "orbits-refused": Case(refused_orbits),
-    "ground": Case(ground),
+    "ground": Case(ground, quick=False),
     "loops": Case(loops, quick=False),
     "design-axes": Case(design_of_axes, quick=False),
     "library-links": Case(links_by_numbers),

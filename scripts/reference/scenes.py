@@ -593,6 +593,7 @@ CASES: Mapping[str, Case] = {
             beside={"spectrum.csv": SPECTRUM},
             more=BUDGET.replace("WITH_LOOP", "true"),
         ),
+        quick=False,
         simulated=True,
     ),
     "whole-rough": Case(whole(SHIPPED, 4, ROUGH, *POINTING), quick=False, simulated=True),

@@ -104,7 +104,7 @@ def manifest_of(call, output, *more):
 
 
 @pytest.mark.promise("report-4", "report-14")
-@pytest.mark.parametrize("change", [rewrite, delete])
+@pytest.mark.parametrize("change", [pytest.param(rewrite, marks=pytest.mark.endurance), delete])
 def test_a_run_is_of_what_was_read(call, files, monkeypatch, change):
     run, meanwhile = study.run_study, []
 

@@ -210,7 +210,9 @@ needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no gcc or clang here"
 
 @pytest.mark.promise("export-14")
 @needs_compiler
-@pytest.mark.parametrize("name", ONE_OF_EACH)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.endurance if name.startswith("PI ") else []) for name in SHIPPED]
+)
 def test_the_compiled_code_equals_the_twin_to_the_last_bit(name, tmp_path):
     of, form, v = shipped(name)
     fixed, rng = form_of(name), np.random.default_rng(5)

@@ -509,7 +509,7 @@ POINTING = {
 @pytest.mark.parametrize(
     ("name", "version"),
     [
-        ("PI + inverse", "2.0"),
+        pytest.param("PI + inverse", "2.0", marks=pytest.mark.endurance),
         ("resonant damping", "3.0"),
         ("LQG of all axes", "3.0"),
         (LEARNS, "3.0"),

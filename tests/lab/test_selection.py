@@ -544,7 +544,7 @@ SHAPES = {
     [
         ("bouc_wen_asymmetric", 1),
         pytest.param("bouc_wen_creep", 1, marks=pytest.mark.endurance),
-        ("prandtl_ishlinskii_rate_creep", 1),
+        pytest.param("prandtl_ishlinskii_rate_creep", 1, marks=pytest.mark.endurance),
         ("prandtl_ishlinskii_joint", 1),
         ("bouc_wen_asymmetric", -1),
         ("prandtl_ishlinskii_joint", -1),

@@ -398,7 +398,7 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
 @pytest.mark.parametrize("name", [pytest.param(controller_study.BASELINE, marks=pytest.mark.endurance), "PI + inverse"])
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
-    table = file.mission.fine_pointing.model_copy(update={"runs": 3})
+    table = file.mission.fine_pointing.model_copy(update={"runs": 3, "duration_s": 0.5, "settle_s": 0.1})
     scene = replace(scene, table=table)
     (verified,) = controller_study.verify(scene, [by_name(tuned[0])[name]])
     simulate, simulated = ensemble.simulate_cases, []

@@ -531,6 +531,7 @@ def test_a_table_of_more_than_it_may_have_is_refused(tmp_path, monkeypatch):
 
 
 @pytest.mark.promise("pointing-9")
+@pytest.mark.endurance
 def test_a_table_goes_from_file_to_fit(tmp_path):
     f = np.geomspace(0.01, 100, 60)
     lines = "\n".join(f"{x:.6e},{160 / (1 + x * x):.6e}" for x in f)
@@ -1780,7 +1781,7 @@ def test_what_a_fit_is_given_is_left_as_it_is():
     edges, rms = np.array([0.0, 1.0, 10.0]), np.array([3e-6, 2e-6])
     fit_bands(edges, rms, convention="radial")
     assert (edges.tolist(), rms.tolist()) == ([0.0, 1.0, 10.0], [3e-6, 2e-6])
-    freq = np.append(0.0, np.geomspace(0.1, 100.0, 12))
+    freq = np.append(0.0, np.geomspace(0.1, 100.0, 30))
     density = 1e-12 / (1.0 + freq**2)
     kept = freq.copy(), density.copy()
     fit_table(freq, density, convention="radial")

@@ -334,7 +334,7 @@ def test_where_the_residual_does_not_tell_the_gentler_value_is_taken():
         pytest.param(
             [axis_plant(gain=0.089e-3 * g, resonance=(900.0, 0.3)) for g in (1.0, 0.8)], marks=pytest.mark.endurance
         ),
-        [NOISY],
+        pytest.param([NOISY], marks=pytest.mark.endurance),
     ],
     ids=["two plants", "one"],
 )

@@ -1,6 +1,7 @@
 """A loop by itself, without a mission: beside linear theory, the paper's loop, and one axis beside two."""
 
 import math
+import os
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -71,7 +72,9 @@ def test_a_run_follows_its_reference_as_the_papers_loop_does():
     assert np.max(np.abs(loop.simulate(SLOW, 0.15).error_rad)) == 0.0
 
 
-@pytest.mark.parametrize("kind", ["PI", pytest.param("PI + notch", marks=pytest.mark.endurance), "LQG"])
+@pytest.mark.parametrize(
+    "kind", ["PI", *(pytest.param(kind, marks=pytest.mark.endurance) for kind in ("PI + notch", "LQG"))]
+)
 def test_a_tuned_controller_keeps_its_margin_and_beats_what_was_there(kind):
     tuned = tune(LOOP, kind, modulus_margin=0.55)
     assert tuned.margins.modulus >= 0.55
@@ -81,16 +84,15 @@ def test_a_tuned_controller_keeps_its_margin_and_beats_what_was_there(kind):
     assert looser.residual_rms_rad[0] <= tuned.residual_rms_rad[0] * (1 + 1e-6)
 
 
-def test_two_axes_that_leave_each_other_alone_are_tuned_as_one(monkeypatch):
+def test_two_axes_that_leave_each_other_alone_are_tuned_as_one():
     two = replace(LOOP, mirror=mirrors.combine(STRAIGHT, STRAIGHT))
     one, both = tune(LOOP, "LQG"), tune(two, "LQG")
     assert_allclose(both.residual_rms_rad, np.repeat(one.residual_rms_rad, 2), rtol=1e-4)
     with pytest.raises(ValueError, match=r"is made for 10000 Hz, and this loop has 20000 Hz"):
         replace(two, rate_hz=20e3).margins(both.controller)
-    monkeypatch.setattr(coupled_study.designs, "STARTS", 1)
-    monkeypatch.setattr(coupled_study.designs, "MODELS", 2)
-    shaped = tune(two, "H-infinity")
-    assert shaped.margins.modulus >= 0.5 and np.all(shaped.residual_rms_rad > both.residual_rms_rad)
+    if os.environ.get("MICRORAD_ENDURANCE"):
+        shaped = tune(two, "H-infinity")
+        assert shaped.margins.modulus >= 0.5 and np.all(shaped.residual_rms_rad > both.residual_rms_rad)
     pid = Controller.pid(0.0, 5e6, rate_hz=10e3, axes=2)
     assert_allclose(two.residual_rms_rad(pid), np.repeat(LOOP.residual_rms_rad(SLOW), 2), rtol=1e-9)
 
