@@ -17,10 +17,10 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(VENV)/.run
 	$(BIN)/microrad run missions/leo-geo.toml --output $(DEMO) --overwrite
 
-# What most tests wait for is compiled first. Types are checked and the numbers compared beside the tests that wait: those
-# are handed out first.
-test: contract lint
-	@$(MAKE) --no-print-directory --jobs=3 FIRST=compiled types numbers unit
+# What most tests wait for is compiled first, beside the rest of the set-up. Types are checked and the numbers compared beside
+# the tests that wait: those are handed out first.
+test:
+	@$(MAKE) --no-print-directory --jobs=3 FIRST="contract lint compiled" types numbers unit
 
 numbers unit: | $(FIRST)
 
@@ -36,7 +36,7 @@ types: $(VENV)/.test
 
 compiled: $(VENV)/.compiled
 
-$(VENV)/.compiled: $(VENV)/.test scripts/compile_kernels.py $(wildcard src/microrad/core/kernels/*.py)
+$(VENV)/.compiled: $(VENV)/.run scripts/compile_kernels.py $(wildcard src/microrad/core/kernels/*.py)
 	$(BIN)/python scripts/compile_kernels.py
 	@touch $@
 
@@ -101,8 +101,8 @@ $(VENV)/bin/python:
 	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { rm -rf $(VENV); sh scripts/install-venv "$(PYTHON)" && $(PYTHON) -m venv $(VENV); }
 
 # On the machines below each file that is installed is held against its hash, those that build the project among them;
-# elsewhere its version alone is (scripts/hashes.py).
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# elsewhere its version alone is (scripts/hashes.py). Bytecode is made of what is used, when it is first used.
+PIP := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check
 MACHINE := $(shell $(PYTHON) -c 'import platform as p, sys; print(p.system(), p.machine(), p.libc_ver()[0], "3.%d" % sys.version_info[1], sep="-")' 2>/dev/null)
 ifneq ($(filter $(MACHINE),$(foreach minor,11 12 13 14,Linux-x86_64-glibc-3.$(minor))),)
 $(VENV)/.run: $(VENV)/bin/python pyproject.toml CHANGELOG.md hashes/lab.txt

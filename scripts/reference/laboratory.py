@@ -841,7 +841,7 @@ CASES: Mapping[str, Case] = {
     "lab-responses": Case(responses),
     "lab-fitted": Case(fitted),
     "lab-static": Case(static),
-    "lab-whole": Case(whole),
+    "lab-whole": Case(whole, quick=False),
     "lab-axes": Case(axes, quick=False),
     "lab-bench": Case(bench),
     "lab-formats": Case(formats),

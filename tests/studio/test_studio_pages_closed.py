@@ -188,7 +188,9 @@ def every_time(session, build):
 WAITS = {"compare": 2, "control": 4, "day": 2, "link": 3, "mirror": 4, "mission": 0, "pointing": 5, "runs": 17}
 
 
-@pytest.mark.parametrize("name", WAITS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.endurance] if n in ("compare", "day") else []) for n in WAITS]
+)
 def test_a_page_may_be_closed_whenever_it_waits(session, name, monkeypatch, read_once, budget_seen):
     monkeypatch.setattr(link, "_REST_S", -1.0)  # asks for the study of the links at once
     monkeypatch.setattr(compare_view, "link_numbers", lambda draft: ())  # takes a second of each visit
