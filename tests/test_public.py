@@ -151,6 +151,7 @@ def test_the_example_of_the_front_page_runs(folder, monkeypatch, capsys):
     assert shown.actual == study.achieved.margin_db
 
 
+@pytest.mark.endurance
 def test_examples_satisfy_a_strict_type_checker_run_from_outside(tmp_path):
     texts = [text for name in microrad._PUBLIC for text in examples(name)]
     body = "".join(f"def example_{i}() -> None:\n{textwrap.indent(text, '    ')}\n\n" for i, text in enumerate(texts))

@@ -1,11 +1,9 @@
 """The documentation site: it builds without a warning, leads nowhere false, loads nothing, and has all that it should.
 
-It is built once for all tests here, with the notebooks as they are stored, as each that is run starts a process of its
-own, and in a plain theme, whose pages are made in a fraction of the time. In make endurance all are run, and the theme
-is the site's own, as in `make site`; tests/test_notebooks.py runs the code of most notebooks.
+It is built once for all tests here, by `make endurance` alone, as by `make site`. Pages, examples and promises have
+tests of their own, and tests/test_notebooks.py runs the code of most notebooks.
 """
 
-import os
 import re
 import subprocess
 import sys
@@ -21,26 +19,13 @@ import build_site
 from site_pages import cases, commands, formulas, names
 from site_pages.tables import plain
 
-OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
-PLAIN = """
-import gc
-import sys
-import build_site
-gc.disable()
-own = build_site.Sphinx
-build_site.Sphinx = lambda confoverrides, **said: own(confoverrides={**confoverrides, "html_theme": "basic"}, **said)
-sys.exit(build_site.main())
-"""
-
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the built site, by what `make site` runs, and what it printed."""
     folder = tmp_path_factory.mktemp("site") / "html"
-    scripts = build_site.ROOT / "scripts"
-    words = [scripts / "build_site.py", folder] if OFTEN else ["-c", PLAIN, folder, "*"]
-    command, here = [sys.executable, *words], os.environ | {"PYTHONPATH": str(scripts)}
-    ran = subprocess.run(command, capture_output=True, text=True, check=False, env=here)
+    command = [sys.executable, build_site.ROOT / "scripts" / "build_site.py", folder]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
     return folder, ran
 
 
@@ -50,6 +35,7 @@ def text_of(page):
 
 
 @pytest.mark.promise("decisions-1", "readme-17")
+@pytest.mark.endurance
 def test_nothing_is_wrong_with_it(site):
     folder, ran = site
     assert (ran.returncode, ran.stdout) == (0, f"{folder / 'index.html'}\n"), ran.stdout + ran.stderr
@@ -59,6 +45,7 @@ def test_nothing_is_wrong_with_it(site):
 
 
 @pytest.mark.promise("readme-17")
+@pytest.mark.endurance
 def test_every_page_of_the_folder_is_in_it(site):
     folder, _ = site
     found = {path.stem for path in (build_site.ROOT / "docs").glob("*.md")}
@@ -66,6 +53,7 @@ def test_every_page_of_the_folder_is_in_it(site):
     assert found <= {path.stem for path in folder.glob("*.html")}
 
 
+@pytest.mark.endurance
 def test_the_page_that_a_refusal_names_is_there(site):
     folder, _ = site
     sources = (build_site.ROOT / "src" / "microrad").rglob("*.py")
@@ -75,6 +63,7 @@ def test_the_page_that_a_refusal_names_is_there(site):
 
 
 @pytest.mark.promise("readme-17")
+@pytest.mark.endurance
 def test_every_public_name_has_a_page_with_its_arguments(site):
     folder, _ = site
     assert set(names.names()) == {name for name in dir(microrad) if not name.startswith("__")}
@@ -92,6 +81,7 @@ def test_every_public_name_has_a_page_with_its_arguments(site):
 
 
 @pytest.mark.promise("readme-17")
+@pytest.mark.endurance
 def test_every_command_is_there_with_its_options(site):
     folder, _ = site
     sections = (folder / "commands.html").read_text(encoding="utf-8").split('<section id="')
@@ -106,6 +96,7 @@ def test_every_command_is_there_with_its_options(site):
 
 
 @pytest.mark.promise("readme-17")
+@pytest.mark.endurance
 def test_every_key_is_there(site):
     folder, _ = site
     page = text_of(folder / "keys.html")
@@ -115,6 +106,7 @@ def test_every_key_is_there(site):
 
 
 @pytest.mark.promise("decisions-5")
+@pytest.mark.endurance
 def test_published_cases_are_within_their_tolerance(site):
     folder, _ = site
     text = text_of(folder / "validation.html")
@@ -130,6 +122,7 @@ def test_the_test_that_a_case_names_is_there():
         assert f"def {name}(" in (build_site.ROOT / path).read_text(encoding="utf-8"), case.test
 
 
+@pytest.mark.endurance
 def test_choices_have_their_figures(site):
     folder, _ = site
     text = text_of(folder / "choose.html")

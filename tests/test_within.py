@@ -228,6 +228,7 @@ def test_what_is_written_is_read_again(tmp_path):
     assert of.load(tmp_path) == values
 
 
+@pytest.mark.endurance
 def test_how_long_functions_are_is_told_by_the_names_that_they_are_held_by():
     lengths = script().lengths()
     assert {"core.kept:Kept.part", "core.folder:read_bytes.<locals>.at_once", "core.budget:total_db"} <= lengths.keys()

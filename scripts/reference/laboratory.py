@@ -840,7 +840,7 @@ CASES: Mapping[str, Case] = {
     "lab-mirrors": Case(mirrors),
     "lab-responses": Case(responses),
     "lab-fitted": Case(fitted),
-    "lab-static": Case(static),
+    "lab-static": Case(static, quick=False),
     "lab-whole": Case(whole, quick=False),
     "lab-axes": Case(axes, quick=False),
     "lab-bench": Case(bench),

@@ -142,6 +142,7 @@ def test_a_row_flies_the_drawn_mirror_under_the_controller_of_the_nominal_one(tm
     assert flat.columns["residual_rms"][0] not in rms
 
 
+@pytest.mark.endurance
 def test_the_rows_are_the_same_by_two_workers_and_by_none(tmp_path, monkeypatch):
     """Here by one; `make endurance` begins both, as another file does for a mirror of one axis."""
     path, found = written(tmp_path, SMALL + LOOP + IDENTIFIED), []

@@ -172,6 +172,7 @@ def test_a_list_beside_the_mission_is_no_part_of_a_run(refused, mission):
 
 
 @pytest.mark.promise("pointing-60")
+@pytest.mark.endurance
 def test_a_correlation_of_the_table_makes_one_line_of_two_sources(call, mission):
     more = TABLE[TABLE.index("[error_budget.sources.alignment]") : TABLE.index("[error_budget.sources.thermo")]
     again = more.replace("sources.alignment", "sources.mounting")

@@ -194,6 +194,7 @@ def coded(tmp_path):
 
 @pytest.mark.promise("link-4")
 @pytest.mark.promise("pointing-39")
+@pytest.mark.endurance
 def test_a_code_word_averages_over_fades_that_are_shorter(call, coded):
     shares = []
     for word in ("0.4 ms", "50 ms"):

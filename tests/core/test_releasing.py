@@ -214,6 +214,7 @@ def test_the_citation_names_what_the_project_is_and_no_version_that_would_age():
 
 # --------------------------------------------------------------------------------------------------------- the archives
 @pytest.mark.promise("releasing-1")
+@pytest.mark.endurance
 def test_every_file_of_the_package_is_in_the_source_archive(tmp_path):
     command = [sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", tmp_path]
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)

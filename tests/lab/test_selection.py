@@ -1279,6 +1279,7 @@ def straight():
     return recording_from_arrays(np.round(drive, 4), np.round(10.0 * drive, 4), rate_hz=200.0)
 
 
+@pytest.mark.endurance
 def test_a_mirror_without_hysteresis_is_identified_in_the_end(monkeypatch):
     """What is left is rounding: a search that follows it to ever stiffer operators never came back."""
     monkeypatch.setattr(candidates, "_STARTS", 3)

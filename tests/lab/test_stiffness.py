@@ -402,6 +402,7 @@ def many(training):
 
 @pytest.mark.promise("mirror-file-39", "hysteretic-stiffness-6", "hysteretic-stiffness-7")
 @pytest.mark.promise("hysteresis-23", "hysteretic-stiffness-31")
+@pytest.mark.endurance
 def test_no_fit_runs_away_where_its_plays_slide(many, training):
     """No combination of sliding plays grows; a thousand periods, and then ten times the drive, stay where they are."""
     m, sums = many.mirror, [sum(play.weights_rad_v) for play in many.mirror.plays]

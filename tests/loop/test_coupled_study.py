@@ -350,6 +350,7 @@ def test_without_hysteresis_the_simulated_residual_is_that_of_theory(case):
 
 
 @pytest.mark.promise("pointing-78")
+@pytest.mark.endurance
 def test_with_hysteresis_the_outlook_is_near():
     made = [designed(plate, name) for name in ("PI", "LQG", "H-infinity")]
     for d, left in zip(made, coupled_study.outlook(plate(), made), strict=True):

@@ -84,6 +84,7 @@ def test_a_tuned_controller_keeps_its_margin_and_beats_what_was_there(kind):
     assert looser.residual_rms_rad[0] <= tuned.residual_rms_rad[0] * (1 + 1e-6)
 
 
+@pytest.mark.endurance
 def test_two_axes_that_leave_each_other_alone_are_tuned_as_one():
     two = replace(LOOP, mirror=mirrors.combine(STRAIGHT, STRAIGHT))
     one, both = tune(LOOP, "LQG"), tune(two, "LQG")

@@ -237,6 +237,7 @@ def test_the_coverage_follows_the_beacon_s_divergence_and_a_narrow_page_has_one_
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
+@pytest.mark.endurance
 def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it_and_says_whose_it_is(opened, links, picture):
     page = opened("day")
     page.get_by_text(re.compile("^Computing, |^The day of the mission as it stands")).first.wait_for()

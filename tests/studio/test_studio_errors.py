@@ -37,6 +37,7 @@ def test_the_page_has_the_view_of_the_report(tmp_path):
     assert all(figure["data"] for figure in figures.values())
 
 
+@pytest.mark.endurance
 def test_sizes_and_limits_have_sliders_that_move_it(tmp_path, monkeypatch):
     monkeypatch.setattr(errors, "budget_figures", lambda found, stacked: ())
     draft = opened(tmp_path, mission_text(*KEPT))

@@ -355,6 +355,7 @@ def test_without_comparison_there_is_none(variant):
     assert len(result.runs) == 10
 
 
+@pytest.mark.endurance
 def test_a_proportional_loop_is_stable(variant):
     result = variant(('integral = "16000 V/(mrad s)"', 'integral = "0 V/(mrad s)"'))
     assert isinstance(result.runs[0].trace, simulate.Trace)
