@@ -580,7 +580,7 @@ SATELLITES = elements(
 BARE = without(SHIPPED, "acquisition", "orbit", "operations", "constellation", "fine_pointing")
 
 CASES: Mapping[str, Case] = {
-    "links": Case(links),
+    "links": Case(links, quick=False),
     "whole-shipped": Case(whole(SHIPPED, 1, SHORT, *POINTING, *DAY, ("budget", "FILE")), quick=False, simulated=True),
     "whole-additive": Case(whole(PAPER, 2, ADDITIVE, *POINTING, *DAY), simulated=True),
     "whole-keplerian": Case(

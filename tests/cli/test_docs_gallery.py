@@ -1,6 +1,6 @@
 """docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure.
 
-Five of the seven are walked through by `make endurance` alone: the commands and functions in them have tests of
+Four of the seven are walked through by `make endurance` alone: the commands and functions in them have tests of
 their own.
 That of the recorded mirror takes its recordings from the folder that MICRORAD_DATA names; it is walked through once
 more with recordings that are made here and a smaller search.
@@ -325,7 +325,6 @@ def test_a_constellations_day(walk):
 
 @pytest.mark.promise("gallery-1", "gallery-26", "gallery-27", "gallery-28", "gallery-29", "gallery-30", "gallery-31")
 @pytest.mark.promise("gallery-32", "gallery-33", "gallery-34", "gallery-35", "gallery-37", "gallery-38", "gallery-39")
-@pytest.mark.endurance
 def test_down_to_the_ground_or_up_to_the_relay(walk, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")  # as wide as the page
     assert "each assumption changed alone" in EXAMPLES[GROUND].rpartition("    microrad contacts leo-geo.toml\n")[2]
