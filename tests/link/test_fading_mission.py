@@ -183,6 +183,8 @@ def test_fades_that_no_power_makes_up_for_are_said(tmp_path, call):
     answered = call("budget", str(tmp_path / "link.toml"), "--json")
     assert json.loads(answered.out)["fading"]["penalty_db"] is None
     assert answered.code == 1, "a margin that is infinitely short is missed"
+    advised = "no power meets it: change communication.fading.interleaver or communication.fading.code."
+    assert advised in " ".join(said(call, 1, str(tmp_path / "link.toml")).split())
     assert [r.met for r in of_links(study) if r.name == UNDER_FADES] == [False]
 
 

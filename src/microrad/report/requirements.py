@@ -7,7 +7,7 @@ from typing import Any
 from microrad import link
 from microrad.core.units import format_quantity
 from microrad.link import study as link_study
-from microrad.link.requirement import DERIVED, Requirement
+from microrad.link.requirement import DERIVED, UNDER_FADES, Requirement
 from microrad.link.study import LinkStudy
 from microrad.mission.tables.link import Beam
 from microrad.report.data import fields
@@ -103,6 +103,8 @@ def advice_for_links(study: LinkStudy, r: Requirement) -> str:
         return ""
     if r.subject == "cone":
         return advice_for_cone(study, r)
+    if r.name == UNDER_FADES and r.margin == -math.inf:
+        return "; no power meets it: change communication.fading.interleaver or communication.fading.code"
     if r.subject == "communication" and m.jitter is not None and -r.margin > _MOST_DB and max(m.jitter.rms_rad) > 0.0:
         return _of_jitter(study, r)
     return advice_for_power(getattr(m, r.subject), r, next(t for t in study.tornados if t.of.lower() == r.subject))
