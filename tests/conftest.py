@@ -36,7 +36,6 @@ if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
 
 
 LONGEST = (
-    "test_site.py",
     "test_studio_browser.py",
     "test_campaign_run.py",
     "test_selection.py",

@@ -207,7 +207,8 @@ def test_in_fixed_point_it_stays_within_its_report(tmp_path):
     of, vectors, fixed = whole()
     r = fixed.report
     print(f"whole numbers add {r.error_v:.2g} V, what learns in single precision up to {r.inverse_v:.2g} V")
-    assert 1e-8 < r.error_v < 1e-6 < r.inverse_v < 1e-4
+    between_v = 1e-5 if OFTEN else 1e-6  # what learns adds up its roundings from sample to sample
+    assert 1e-8 < r.error_v < between_v < r.inverse_v < 1e-4
     assert r.bound_v <= 2.01 * of.resolution_v
     assert "The inverse, in single precision, adds up to" in quantisation_text(fixed)
     for file, text in fixed_code(of, sections(of), fixed, "flown").items():
