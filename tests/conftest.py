@@ -5,11 +5,13 @@ import gc
 import importlib
 import os
 import random
+from functools import cache
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 os.environ.pop("MAKEFLAGS", None)  # a make that tests call is not part of the one that calls them
 
 import pytest
+import typer.main
 from hypothesis import settings
 
 import reference.within  # before the package, which it loads its own way
@@ -20,6 +22,8 @@ from microrad import cli
 from small_campaign import without_worker
 
 pytest_plugins = ("browser",)
+
+typer.main.get_command = cache(typer.main.get_command)  # once in a process, not for each of thousands of commands
 
 # The gate looks at the same examples each time: what one run finds, the next one finds, too. To look for new ones:
 # HYPOTHESIS_PROFILE=explore make unit

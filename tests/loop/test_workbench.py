@@ -20,13 +20,17 @@ from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.loop.workbench import Controller, Loop, tune
 from microrad.mirror.hysteresis import PrandtlIshlinskii
 from microrad.mirror.model import Mirror
+from shared import once
 
 LINEAR_PART = ([1.0], [1 / 6000**2, 2 * 0.05 / 6000, 1.0])
 STRAIGHT = Mirror.of(50e-6, *LINEAR_PART, name="straight")
 PLAYS = PrandtlIshlinskii((0.0, 1.0, 3.0), (40e-6, 6e-6, 4e-6))
 BENT = Mirror.of(PLAYS, *LINEAR_PART)
 FREQ_HZ = np.geomspace(0.1, 1000, 100)
-VIBRATION = fit_spectrum(FREQ_HZ, 160e-12 / (1 + FREQ_HZ**2), convention="radial")
+VIBRATION = once(
+    "vibration of the workbench",
+    lambda: fit_spectrum(FREQ_HZ, 160e-12 / (1 + FREQ_HZ**2), convention="radial"),
+)
 LOOP = Loop(mirror=STRAIGHT, rate_hz=10e3, vibration=VIBRATION, sensor_noise_rad=0.2e-6, delay_s=20e-6)
 SLOW = Controller.pid(0.0, 5e6, rate_hz=10e3)
 

@@ -381,8 +381,8 @@ def discretise(mirror: Mirror, step_s: float, *, often: bool = False) -> kernels
     Args:
         mirror: The mirror, continuous in time.
         step_s: Length of a step.
-        often: Whether it is simulated often, as in a fit: then its loops on one axis are unrolled whatever its size,
-            which takes a second or two to compile once and half of the time to run.
+        often: Whether it is simulated over many steps, as in a fit to long recordings: then its loops on one axis are
+            unrolled whatever its size, which takes some seconds to compile once and half of the time to run.
 
     Raises:
         ValueError: Where q = F x closes a loop through one step that is no contraction; names a step that would do.

@@ -4,6 +4,7 @@ import difflib
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
@@ -31,6 +32,7 @@ class Preset:
     whole: bool
 
 
+@cache
 def presets() -> tuple[Preset, ...]:
     """All presets, by name."""
     return tuple(_preset(name, file) for name, file in sorted(_files().items()))

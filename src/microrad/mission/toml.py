@@ -10,6 +10,7 @@ import tomllib
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -136,7 +137,8 @@ _TOKEN = re.compile(
 )
 
 
-def scan(text: str) -> list[Statement]:
+@lru_cache(maxsize=8)
+def scan(text: str) -> tuple[Statement, ...]:
     """Every statement of a TOML text, in order. Never fails: what is no statement is "junk".
 
     A list that is not closed ends where the next key or table begins.
@@ -154,7 +156,7 @@ def scan(text: str) -> list[Statement]:
                 table = _table_of(statements[-1], table)
         line += text.count("\n", position, end)
         position = end
-    return statements
+    return tuple(statements)
 
 
 def _header(text: str, position: int, line: int, stripped: str) -> Statement:

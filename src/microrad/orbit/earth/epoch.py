@@ -202,6 +202,7 @@ def _tables() -> _Tables:
     return _Tables(scale.leap_dates - _JULIAN_OF_ORDINAL, offsets, first, _TT_MINUS_TAI_S - delta_t_s)
 
 
+@lru_cache(maxsize=256)
 def _tai_minus_utc_s(day: int) -> float:
     """TAI - UTC during the day with this ordinal, in s."""
     tables = _tables()

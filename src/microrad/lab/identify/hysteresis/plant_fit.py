@@ -34,6 +34,7 @@ _DIFFERENCE = 1e-5
 _BANK = ("bouc_wen", "operator", "play_start", "play_threshold", "play_weight")  # fields of a plant
 _KEPT = 100  # discretised mirrors
 _SLICE = 2_000_000
+_OFTEN = 100_000  # steps of all runs, above which loops that a search runs a thousand times are worth being unrolled
 _LINES = 30  # of the spectrum of a residual to either side, at least, that tell its power
 _AS_GOOD_AS_NONE = 1e-6  # of the mean power of J over all lines
 _LEFT = 1e-3  # share of a line's power, at least, that a fit is taken to leave
@@ -278,6 +279,7 @@ class PlantProblem:
         """The parameters are searched in units of their scale."""
         self.structure, self.runs = structure, tuple(records)
         self.steps = {(run.step_s, run.hold) for run in self.runs}
+        self.often = sum(run.drive.shape[0] for run in self.runs) > _OFTEN
         self.scale = np.array([p.scale for p in structure.parameters])
         self.lower = np.array([p.lower for p in structure.parameters]) / self.scale
         self.upper = np.array([p.upper for p in structure.parameters]) / self.scale
@@ -315,12 +317,14 @@ class PlantProblem:
     def _outputs(self, model: Mirror) -> list[Floats]:
         """Of each run the output of a mirror at every step, without the delay behind it."""
         longest = max(run.step_s for run in self.runs)  # where one of them has no plant, it is this
-        own = mirror.discretise(model, longest, often=True)
+        own = mirror.discretise(model, longest, often=self.often)
         bank = {field: getattr(own, field) for field in _BANK}
         linear = (len(model.bouc_wen), *(getattr(model, field).tobytes() for field in "ABEFGCDK"))
         shared = self.discrete.get(linear)
         if shared is None:
-            shared = {step: mirror.discretise(model, step, often=True) for step, _ in self.steps if step != longest}
+            shared = {
+                step: mirror.discretise(model, step, often=self.often) for step, _ in self.steps if step != longest
+            }
             shared[longest] = own
             if len(self.discrete) > _KEPT:  # those of places that the search has left
                 self.discrete.clear()
