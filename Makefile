@@ -40,9 +40,10 @@ $(VENV)/.compiled: $(VENV)/.run scripts/compile_kernels.py $(wildcard src/micror
 	$(BIN)/python scripts/compile_kernels.py
 	@touch $@
 
-# Each quantity of the quick cases against reference/; `scripts/numbers check --all` compares all cases.
+# Each quantity of the quick cases against reference/; `scripts/numbers check --all` compares all cases. Beside the tests it
+# takes the time in which these wait.
 numbers: $(VENV)/.test
-	$(BIN)/python scripts/numbers check
+	nice -n 19 $(BIN)/python scripts/numbers check
 
 # Assertions as they stand: to rewrite those of all files takes each process half a minute. What fails runs once more and
 # shows its values.

@@ -582,7 +582,7 @@ BARE = without(SHIPPED, "acquisition", "orbit", "operations", "constellation", "
 CASES: Mapping[str, Case] = {
     "links": Case(links, quick=False),
     "whole-shipped": Case(whole(SHIPPED, 1, SHORT, *POINTING, *DAY, ("budget", "FILE")), quick=False, simulated=True),
-    "whole-additive": Case(whole(PAPER, 2, ADDITIVE, *POINTING, *DAY), simulated=True),
+    "whole-additive": Case(whole(PAPER, 2, ADDITIVE, *POINTING, *DAY), quick=False, simulated=True),
     "whole-keplerian": Case(
         whole(
             SHIPPED,

@@ -1281,3 +1281,12 @@ def test_a_distribution_that_jumps_is_looked_at_just_before_the_jump():
     latency_s, share = figures._distribution(SimpleNamespace(latency=at))
     assert (share[0], share[-1], latency_s[-1]) == (0.0, 1.0, 10.0)
     assert 10.0 - 1e-7 < latency_s[0] < 10.0
+
+
+def test_a_distribution_of_few_bends_is_a_curve_of_many_points():
+    """Its axis is logarithmic: straight lines from bend to bend would leave the true shares."""
+    ramp = SimpleNamespace(first_s=np.array([10.0]), last_s=np.array([1000.0]), cdf=lambda t: (t - 10.0) / 990.0)
+    latency_s, share = figures._distribution(SimpleNamespace(latency=ramp))
+    between = np.geomspace(latency_s[1], latency_s[-1], 500)
+    drawn = np.interp(np.log(between), np.log(latency_s), share)
+    np.testing.assert_allclose(drawn, ramp.cdf(between), rtol=0, atol=1e-3)
