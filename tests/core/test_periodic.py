@@ -37,3 +37,12 @@ def test_a_line_at_half_the_rate_keeps_its_samples_and_is_a_cosine_between(sampl
     assert_allclose(fine[::factor], alternating, rtol=0, atol=1e-12)
     late = delayed(alternating, 1.0, 1.0, factor)
     assert_allclose(late[::factor], np.roll(alternating, 1, axis=0), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("delay_s", [0.5, -0.2, 1.75])
+@pytest.mark.parametrize("samples", [2, 4, 10])
+@pytest.mark.parametrize("factor", [2, 3])
+def test_a_line_at_half_the_rate_is_late_by_any_share_of_a_sample(samples, factor, delay_s):
+    alternating = np.cos(np.pi * np.arange(samples))[:, None]
+    late = delayed(alternating, 1.0, delay_s, factor)[:, 0]
+    assert_allclose(late, np.cos(np.pi * (np.arange(samples * factor) / factor - delay_s)), rtol=0, atol=1e-12)

@@ -29,7 +29,7 @@ def delayed(signals: Floats, rate_hz: float, delay_s: float, factor: int) -> Flo
         delay_s: Delay, in s, positive for later.
         factor: Samples of the result for each of theirs.
     """
-    spectrum = np.fft.rfft(signals, axis=0)
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(signals.shape[0], 1 / rate_hz) * delay_s)
-    late = np.fft.irfft(spectrum * turn[:, None], signals.shape[0], axis=0)
-    return np.ascontiguousarray(upsampled(late, factor))
+    fine = upsampled(signals, factor)  # before it is turned: a line at half of their rate has no phase at that rate
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(fine.shape[0], 1 / (factor * rate_hz)) * delay_s)
+    late = np.fft.irfft(np.fft.rfft(fine, axis=0) * turn[:, None], fine.shape[0], axis=0)
+    return np.ascontiguousarray(late)
