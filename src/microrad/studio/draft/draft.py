@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
@@ -314,7 +314,7 @@ def _line_begin(plain: str, line: int) -> int:
     return begin
 
 
-def _last_line(statements: list[Statement], begin: int) -> int:
+def _last_line(statements: Sequence[Statement], begin: int) -> int:
     """The last line of the keys of the table whose header stands before `begin`; 0 at the very top."""
     line = statements[begin - 1].last_line if begin else 0
     for each in statements[begin:]:
