@@ -110,9 +110,10 @@ def pytest_configure(config):
 def pytest_collection_finish():
     """From here on there may be garbage, which clusters need to have found: it ends what closed workers still hold.
 
-    What is there by now stays: nobody looks through it again.
+    What is there by now stays: nobody looks through it again. For what comes, looking seldom is enough.
     """
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
     gc.enable()
 
 

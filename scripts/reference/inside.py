@@ -17,9 +17,8 @@ import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from datetime import date, timedelta
-from functools import partial
+from functools import lru_cache, partial
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
-from itertools import islice
 from pathlib import Path, PurePath
 from types import CodeType, FrameType, MappingProxyType, ModuleType
 from typing import Any
@@ -95,29 +94,44 @@ def value(of: object) -> float:
     Args:
         of: A number, words, an array, a record or what holds such.
     """
-    return sum((1.0 + k * 0.6180339887498949 % 1.0) * part for k, part in enumerate(islice(_parts(of, 0), PARTS)))
+    parts: list[float] = []
+    _take_apart(of, 0, parts)
+    return sum(weight * part for weight, part in zip(_WEIGHTS, parts, strict=False))
 
 
-def _parts(of: Any, depth: int) -> Iterator[float]:
+_WEIGHTS = tuple(1.0 + k * 0.6180339887498949 % 1.0 for k in range(PARTS))
+
+
+def _take_apart(of: Any, depth: int, parts: list[float]) -> None:
+    """Put the parts of a value behind those that there are; of what is large the first ones."""
+    if len(parts) >= PARTS:
+        return
     if of is None or depth > DEEPEST:
-        yield 0.5
-    elif isinstance(of, bool | int | float | complex | np.number | np.bool_):
-        yield from _array(np.atleast_1d(of)) if isinstance(of, complex) else (_magnitude(_float(of)),)
+        parts.append(0.5)
     elif isinstance(of, str):
-        yield zlib.crc32(_CHANGING.sub("", of).encode(errors="surrogatepass")) % 9973 / 997.3
+        parts.append(_word(of))
+    elif isinstance(of, bool | int | float | np.number | np.bool_) and not isinstance(of, complex):
+        parts.append(_magnitude(_float(of)))
+    elif isinstance(of, complex):
+        parts.extend(_array(np.atleast_1d(of)))
     elif isinstance(of, np.ndarray) and of.dtype.kind in "OUS":
-        yield from _parts([*of.shape, *of.ravel()[:SPREAD].tolist()], depth + 1)
+        _take_apart([*of.shape, *of.ravel()[:SPREAD].tolist()], depth + 1, parts)
     elif isinstance(of, np.ndarray):
-        yield from _array(of)
+        parts.extend(_array(of))
     elif isinstance(of, set | frozenset):
-        yield 0.1 * len(of) + sum(value(each) for each in of)
+        parts.append(0.1 * len(of) + sum(value(each) for each in of))
     elif (words := _worded(of)) is not None:
-        yield from _parts(words, depth)
+        parts.append(_word(words))
     else:
         inner = _inner(of)
-        yield 0.1 * len(inner)
+        parts.append(0.1 * len(inner))
         for each in inner:
-            yield from _parts(each, depth + 1)
+            _take_apart(each, depth + 1, parts)
+
+
+@lru_cache(maxsize=10_000)
+def _word(words: str) -> float:
+    return zlib.crc32(_CHANGING.sub("", words).encode(errors="surrogatepass")) % 9973 / 997.3
 
 
 def _worded(of: Any) -> str | None:
@@ -210,6 +224,7 @@ class Watch:
     def __init__(self) -> None:
         """Nothing yet."""
         self.values: Values = defaultdict(dict)
+        self.done: set[str] = set()  # functions of which nothing more is taken
         self._calls: dict[str, int] = defaultdict(int)
         self._is_busy = False
 
@@ -226,6 +241,8 @@ class Watch:
     def takes(self, name: str) -> int:
         """Which call of a function this is, and 0 where its value is not taken."""
         call = self._calls[name] = self._calls[name] + 1
+        if call == CALLS[-1]:
+            self.done.add(name)
         return call if call in CALLS else 0
 
     def enters(self, name: str, frame: FrameType) -> None:
@@ -252,8 +269,9 @@ class Watch:
 
 
 def _returning(name: str, returned: object) -> object:
-    if Watch.current is not None:
-        Watch.current.saw(name, returned)
+    watch = Watch.current
+    if watch is not None and name not in watch.done:
+        watch.saw(name, returned)
     return returned
 
 
