@@ -1520,3 +1520,9 @@ def test_the_row_that_decides_is_the_first_beyond_the_share_and_of_equal_ones_th
     from microrad.campaign.optimisation.candidates import _at
 
     assert _at(np.array(values), np.array(weight), probability) == at
+
+
+def test_the_document_of_an_optimum_without_a_design_has_the_best_of_those_tried_and_says_that_none_is_feasible():
+    missed = optimum_data(found_with([kept_by(0.5, 0.4, 0.6, -1.0)], fresh=None, reason="too few rows"))
+    assert (missed["feasible"], missed["best"]["feasible"], missed["reason"]) == (False, False, "too few rows")
+    assert optimum_data(optimise(problem(), rising(), rising(seed=5, spread=1.1), quiet))["feasible"] is True

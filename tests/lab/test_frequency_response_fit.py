@@ -1071,3 +1071,14 @@ def test_a_start_that_lacks_something_has_a_second_one_of_fewer_poles_of_full_ra
     else:
         assert sketched_with == [order, other]
         assert best.start == (("reduced", ("modes", other), order) if again < cost else ("start", order))
+
+
+def test_the_error_of_the_sketch_counts_each_element_by_its_factor():
+    table = three_axes()
+    one, size = np.ones((1, table.freq_hz.size)), table.response[0].size
+    factors = np.geomspace(0.01, 100.0, size)[:, None]
+    found = sketched(table.freq_hz, table.response, one, factors, table.order)
+    poles = 2j * np.pi * table.freq_hz[:, None] - found.poles_rad_s
+    error = np.einsum("kp,poi->koi", 1.0 / poles, found.residues) + found.direct - table.response
+    expected = np.sqrt(np.sum(factors[:, 0] * np.abs(error.reshape(-1, size)) ** 2) / error.size)
+    assert found.rms_error == pytest.approx(expected, rel=1e-6)

@@ -682,3 +682,11 @@ def test_a_loop_is_cut_at_the_sensors_that_its_controller_looks_at_and_not_at_it
     margins = batch.Margins(loop, LoopController("own", one, np.zeros((1, 1))))
     assert [cut.__name__ for cut in margins._cuts] == cuts
     assert margins._answers.shape[1:] == (1, readings)
+
+
+def test_parameters_that_make_no_mirror_of_several_axes_have_none():
+    """Plays as heavy as that take more than the whole stiffness away where they slide: the mirror would grow."""
+    known = worst_case.of_several_axes(several_axes.two_axes())
+    heavier = np.array([0.0, 0.0, 1.0, 0.0])
+    assert known.moved(100.0 * heavier) is not None
+    assert known.moved(1000.0 * heavier) is None

@@ -330,3 +330,9 @@ def test_places_on_opposite_sides_of_the_earth_are_half_a_turn_apart():
         assert found[0, 1] == found[1, 0] == pytest.approx(math.pi * EARTH_RADIUS_M, abs=1.0)
         assert found[0, 2] == pytest.approx((math.pi / 2.0 - latitude) * EARTH_RADIUS_M, abs=1.0)
         assert np.all(np.diag(found) == 0.0)
+
+
+def test_no_seed_has_the_weather_of_another_in_one_of_its_runs():
+    of = weather(THREE)
+    skies_of = [drawn(of, 20, seed=seed, run=run).tobytes() for seed in range(3) for run in range(3)]
+    assert len(set(skies_of)) == 9
