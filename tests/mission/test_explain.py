@@ -253,3 +253,10 @@ def test_a_key_of_several_files_is_shipped_with_the_mission_alone_and_keys_of_a_
     assert {key.name for key in explained("rate_limit")} == {"rate_limit"}
     errors = [key.name for key in explained("standard_errors")]
     assert errors == ["mirror.uncertainty.standard_errors", *["uncertainty.standard_errors"] * 2]
+
+
+def test_a_table_within_another_is_told_by_its_own_first_line():
+    (inner,) = explained("fine_pointing.geometry")
+    (outer,) = (key for key in explained("fine_pointing") if key.name == "fine_pointing")
+    assert inner.meaning == "From the mirror's outputs to the line of sight."
+    assert outer.meaning.startswith("The fine-pointing loop and how it is judged")
