@@ -5,12 +5,14 @@ import json
 import pickle
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from microrad import report
 from microrad.core.kept import Kept
+from microrad.report.plotting import layout
 from shipped import whole_drawn
 
 COLUMNS = json.loads(Path(__file__).with_name("figure_columns.json").read_text(encoding="utf-8"))
@@ -64,3 +66,15 @@ def test_numbers_end_early_and_stay_empty_where_there_are_none():
         ["c", "", ""],
         ["", "inf", ""],
     ]
+
+
+def test_a_sheet_grows_by_what_its_panels_and_their_margins_lack():
+    panels = [
+        SimpleNamespace(panel=SimpleNamespace(column=0, columns=1, row=row, equal=False), inner=None, colours=None)
+        for row in (0, 1)
+    ]
+    sheet = SimpleNamespace(widths=(1.0,), heights=(1.0, 1.0))
+    least = layout._LEAST
+    grown = layout._share(sheet, panels, [(10.0, 20.0, 5.0, 30.0)] * 2, (0.0, 0.0, 400.0, 120.0))
+    assert grown == 2.0 * least - (120.0 - 2.0 * (20.0 + 30.0))
+    assert panels[-1].inner[3] + 30.0 == 120.0 + grown

@@ -3498,3 +3498,8 @@ def test_what_another_tab_accepts_no_longer_is_accepted_here_no_longer(bench):
         mirror_form.keep_form(bench.path, Form(Setting(accept=accepted)))
         asyncio.run(bench.look())
         assert (bench.form.setting.accept, bench.fields["accept"].value) == (accepted, list(accepted))
+
+
+def test_headings_of_a_table_keep_their_units_and_names():
+    columns = elements._columns(["loss\n(dB)", "rate in Mbit/s", "LQG"])
+    assert [each["label"] for each in columns] == ["Loss (dB)", "Rate in Mbit/s", "LQG"]
