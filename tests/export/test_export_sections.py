@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import designs
 from microrad.core import lti
 from microrad.export import choice
+from microrad.export.flight import c_code
 from microrad.export.identifiers import LONGEST, identifier, suggested
 from microrad.export.linear_part import block_diagonal as block_diagonal_form
 from microrad.export.linear_part import block_diagonal as parting
@@ -913,3 +914,10 @@ def test_a_block_of_too_many_states_keeps_what_stands_below_it():
         assert X[1, 0] == pytest.approx(found, rel=1e-9, abs=1e-30)
         X[1, 0] = 0.0
         assert not X.any()
+
+
+def test_the_code_says_how_many_blocks_there_are_of_one_state_and_of_two(flying):
+    _, less, form, _ = flying["LQG"]
+    code = c_code.flight_code(less, form, "lqg", "double")["lqg.c"]
+    of_one, of_two = map(int, re.search(r"\b(\d+) of 1, (\d+) of 2 states", code).groups())
+    assert of_one + 2 * of_two == form.order == 22

@@ -12,7 +12,8 @@ import pytest
 
 from microrad import report
 from microrad.core.kept import Kept
-from microrad.report.plotting import layout
+from microrad.report.plotting import layout, svg
+from microrad.report.plotting.sheet import Line
 from shipped import whole_drawn
 
 COLUMNS = json.loads(Path(__file__).with_name("figure_columns.json").read_text(encoding="utf-8"))
@@ -78,3 +79,9 @@ def test_a_sheet_grows_by_what_its_panels_and_their_margins_lack():
     grown = layout._share(sheet, panels, [(10.0, 20.0, 5.0, 30.0)] * 2, (0.0, 0.0, 400.0, 120.0))
     assert grown == 2.0 * least - (120.0 - 2.0 * (20.0 + 30.0))
     assert panels[-1].inner[3] + 30.0 == 120.0 + grown
+
+
+def test_the_legend_shows_a_line_as_it_is_drawn():
+    (dotted,) = svg._swatch(Line(np.zeros(2), np.zeros(2), dash=":"), 0.0, 0.0)
+    (solid,) = svg._swatch(Line(np.zeros(2), np.zeros(2)), 0.0, 0.0)
+    assert "stroke-dasharray" in dotted and "stroke-dasharray" not in solid
