@@ -527,8 +527,13 @@ def whole(place: Place) -> list[str]:
     return found + identified(place, "loops.csv", "lines-0.csv", "lines-1.csv", *periodic, as_json=True, digits=2)
 
 
-SEARCHED = re.compile(r"(candidates\.hysteretic|worst|verdict|band_error|delay_s|responses\.\d+\.modelled).*")
-"""What the search for hysteretic stiffness leaves: it is ended before its optimum, elsewhere on each processor."""
+SEARCHED = re.compile(
+    r"(candidates\.hysteretic|within_noise\.[1-9]|worst|verdict|band_error|delay_s|responses\.\d+\.modelled).*"
+)
+"""What the search for hysteretic stiffness leaves: it is ended before its optimum, elsewhere on each processor.
+
+Among it which candidates are as good as the chosen one, as that hangs on what is left of them.
+"""
 
 
 def sprung(drives: Floats) -> dict[str, Floats]:
