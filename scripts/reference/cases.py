@@ -263,9 +263,12 @@ GIVEN = {
 
 @functools.cache
 def listed_presets() -> Any:
-    """What the command line lists, asked once for all presets."""
+    """What the command line lists, asked once for all presets, and so inside of none of them."""
+    of_case, warm.inside_of[:] = warm.inside_of[:], []
     with tempfile.TemporaryDirectory(prefix="microrad-numbers-") as folder:
-        return Place(Path(folder)).json("presets")
+        listed = Place(Path(folder)).json("presets")
+    warm.inside_of[:] = of_case
+    return listed
 
 
 def preset(name: str) -> Callable[[Place], Any]:
