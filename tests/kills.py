@@ -1,6 +1,6 @@
 """Commands that are killed at random moments: whatever is left is whole, and going on ends as if nothing had been.
 
-    PYTHONPATH=src:tests:scripts python tests/kills.py --kills 200 [NAME...]   each command by default, and what it found
+    PYTHONPATH=src:tests:scripts python tests/kills.py --kills 200 [NAME...] each command by default, and what it found
 
 A kill is SIGKILL of one of the processes that the command has then: itself, a worker, or what runs a job of the studio.
 """
