@@ -2,11 +2,12 @@
 
 import os
 import signal
+from random import Random
 
 import numpy as np
 import pytest
 
-from fuzzing import properties, run, seeds
+from fuzzing import mutate, properties, run, seeds
 from fuzzing.formats import FORMATS
 from preset_files import EXAMPLES, completed
 from waiting import HANG_S
@@ -33,6 +34,15 @@ def test_what_has_fallen_before_does_so_no_more(path, tmp_path):
 def test_a_case_is_the_same_each_time(name):
     made = [repr(run.case(FORMATS[name], 3, number)) for number in (7, 8, 7)]
     assert made[0] == made[2] != made[1]
+
+
+def test_what_a_case_changes_is_its_own():
+    """Later ones would begin with what an earlier one has made of the values that are drawn, or hold them in a circle."""
+    before, data = repr(mutate.VALUES), {"a": [1, {"b": "c"}], "d": 2.0}
+    for number in range(2000):
+        mutate.plain(Random(number), data, data)
+    assert repr(mutate.VALUES) == before
+    assert data == {"a": [1, {"b": "c"}], "d": 2.0}
 
 
 class Fake:

@@ -350,7 +350,7 @@ def _change(draw: Random, made: list[Any], other: Any) -> None:
     elif how == 2:
         holder[key] = copy.deepcopy(draw.choice([inner[at] for inner, at in _inner([other])]))
     elif how == 3:
-        deep: Any = draw.choice(VALUES)
+        deep: Any = copy.deepcopy(draw.choice(VALUES))
         for _ in range(draw.choice((5, 40, 150))):
             deep = [deep] if draw.random() < 0.5 else {"x": deep}
         holder[key] = deep
