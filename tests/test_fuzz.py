@@ -37,7 +37,7 @@ def test_a_case_is_the_same_each_time(name):
 
 
 def test_what_a_case_changes_is_its_own():
-    """Later ones would begin with what an earlier one has made of the values that are drawn, or hold them in a circle."""
+    """Later ones would begin with what an earlier one has made of the values, or hold them in a circle."""
     before, data = repr(mutate.VALUES), {"a": [1, {"b": "c"}], "d": 2.0}
     for number in range(2000):
         mutate.plain(Random(number), data, data)
