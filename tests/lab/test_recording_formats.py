@@ -26,7 +26,7 @@ from microrad.core.units import printable
 from microrad.lab.recording import RecordingError, files, multisine_recordings, read_in, read_recording
 from microrad.lab.recording.formats import text as text_format
 from microrad.lab.recording.formats.arrays import Variable, _with_axes, channels_of, indexed, rates_of, stated_rate
-from microrad.lab.recording.formats.hdf5 import _lzf_bytes, _unpacked_bytes, unusable_dataset
+from microrad.lab.recording.formats.hdf5 import _lzf_bytes, _unpacked_bytes, check_heaps, unusable_dataset
 from microrad.lab.recording.formats.lvm import LvmSource, _Blanks, _count_lines
 from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged, is_time_name, time_unit
 from microrad.lab.recording.formats.tdms import TdmsSource, _check_scales, _Listener, check_structure
@@ -1113,6 +1113,57 @@ def test_a_piece_that_does_not_unpack_to_what_it_states(tmp_path, kind, packing,
     with h5py.File(path, "a") as file:
         file["drive"][:] = DRIVE
     check(read_recording(path, "drive", "output", RATE_HZ))
+
+
+def with_texts(path, length_bytes=8):
+    """A file with units as texts of various lengths, in a heap; returns its bytes, and where its entries begin."""
+    made = h5py.h5p.create(h5py.h5p.FILE_CREATE)
+    made.set_sizes(8, length_bytes)
+    with h5py.File(h5py.h5f.create(str(path).encode(), fcpl=made)) as file:
+        for name, values, unit in (("drive", DRIVE, "V"), ("output", OUTPUT, "mrad")):
+            file.create_dataset(name, data=values).attrs["unit"] = unit
+    content = path.read_bytes()
+    return content, content.index(b"GCOL\x01") + 16
+
+
+@pytest.mark.parametrize(
+    ("entry", "size", "refused"),
+    [
+        (2, lambda file: 0, True),  # the free space, in which the library would stay for ever
+        (0, lambda file: 2**64 - 16, True),  # with its header no byte
+        (0, lambda file: 2**64 - 1, True),
+        (1, lambda file: file - 15, True),  # with its header a byte more than there is
+        (1, lambda file: file - 16, False),
+    ],
+)
+def test_a_heap_without_an_end_is_refused_and_not_looked_through_for_ever(tmp_path, entry, size, refused):
+    path = tmp_path / "a.h5"
+    content, begin = with_texts(path)
+    assert read_recording(path, "drive", "output", RATE_HZ).input_units == ("V",)
+    place = begin + 24 * entry + 8  # each of the two texts takes a header of 16 bytes and 8
+    path.write_bytes(content[:place] + struct.pack("<Q", size(len(content))) + content[place + 8 :])
+    if not refused:
+        return check_heaps(path, 8)
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert message.endswith(
+        f"a store of texts in it, at byte {begin - 16}, has no end; the file is damaged, or made to do harm: copy it "
+        "again from its source."
+    )
+    return None
+
+
+@pytest.mark.parametrize("length_bytes", [4, 8])
+def test_each_heap_of_a_file_is_looked_at_with_the_lengths_that_its_head_states(tmp_path, length_bytes):
+    path = tmp_path / "a.h5"
+    content, begin = with_texts(path, length_bytes)
+    assert read_recording(path, "drive", "output", RATE_HZ).output_units == ("mrad",)
+    heap = content[begin - 16 : begin + 48]
+    path.write_bytes(content + heap + bytes(16))  # a second one, whose free space is empty
+    at = len(content) + 8
+    changed = path.read_bytes()
+    path.write_bytes(changed[:at] + (80).to_bytes(length_bytes, "little") + changed[at + length_bytes :])
+    with pytest.raises(RecordingError, match=f"at byte {len(content)}, has no end"):
+        check_heaps(path, length_bytes)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """HDF5 files, MATLAB's version 7.3 among them; datasets are named `group/dataset`. No other file is ever opened."""
 
 import math
+import mmap
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -202,6 +203,43 @@ def _lzf_bytes(data: bytes) -> int:
     return size if place == len(data) else 0
 
 
+_HEAP = b"GCOL\x01\0\0\0"
+
+
+def check_heaps(path: Path, length_bytes: int) -> None:
+    """Check that each global heap, where texts and rows of various lengths are stored, has an end.
+
+    In one with a free space of no bytes, or with an entry longer than the file, the library may look for the next entry
+    for ever. Source: HDF5 File Format Specification 3.0, III.E, "Global Heap".
+
+    Args:
+        path: The file.
+        length_bytes: Bytes of a length in it, which its head states.
+
+    Raises:
+        RecordingError: If a heap has no end.
+    """
+    header = 8 + -(-length_bytes // 8) * 8  # of a heap, and of each entry
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+
+        def number(place: int, size: int) -> int:
+            return int.from_bytes(content[place : place + size], "little")
+
+        heap = content.find(_HEAP)
+        while heap >= 0:
+            place, end = heap + header, min(heap + number(heap + 8, length_bytes), len(content))
+            while place + header <= end:
+                size = number(place + 8, length_bytes)
+                size = header + size if number(place, 2) else size  # entry 0 is the free space, its header included
+                if not 0 < size <= len(content):
+                    raise RecordingError(
+                        f"{path}: a store of texts in it, at byte {heap}, has no end; the file is damaged, or made to "
+                        "do harm: copy it again from its source."
+                    )
+                place += -(-size // 8) * 8
+            heap = content.find(_HEAP, heap + 1)
+
+
 _MOST_DEEP = 50
 
 
@@ -216,6 +254,7 @@ class Hdf5Source(ArraySource):
         stated: dict[str, tuple[StatedRate, ...]] = {}
         try:
             with h5py.File(path, "r") as file:
+                check_heaps(path, file.id.get_create_plist().get_sizes()[1])
                 self._search(file, path, matlab, unusable, stated)
         except RecordingError:
             raise
