@@ -676,6 +676,15 @@ def own_headers(port, **changes):
     return "".join(f"{name}: {value}\r\n" for name, value in found.items() if value is not None)
 
 
+def received(link, wanted=None):
+    """What the server sends until it ends, or until this is among it."""
+    found = b""
+    with contextlib.suppress(ConnectionError):
+        while not (wanted and wanted in found) and (part := link.recv(65536)):
+            found += part
+    return found
+
+
 def raw(port, head, body=(), most=1 << 30):
     """Send a head and blocks until the server answers or ends it; its status and how many bytes of body it let pass."""
     passed = 0
@@ -686,10 +695,7 @@ def raw(port, head, body=(), most=1 << 30):
                 link.sendall(block)
                 passed += len(block)
                 assert passed <= most
-        answer = b""
-        with contextlib.suppress(ConnectionError):
-            while b"\r\n" not in answer and (part := link.recv(65536)):
-                answer += part
+        answer = received(link, b"\r\n")
     return (int(answer.split()[1]) if answer else None), passed
 
 
@@ -780,14 +786,19 @@ def test_whoever_waits_for_leave_to_send_is_refused_before_it(server):
     assert raw(port, head + own_headers(port, Content_Length="1000000000", Expect="100-continue"))[0] == 413
 
 
-def handshake(port, **changes):
-    upgrade = {
+def upgrade(port, **changes):
+    """The head that asks for a websocket, but for the empty line at its end."""
+    asked = {
         "Upgrade": "websocket",
         "Connection": "Upgrade",
         "Sec_WebSocket_Key": "dGhlIHNhbXBsZSBub25jZQ==",
         "Sec_WebSocket_Version": "13",
     }
-    return raw(port, "GET /_nicegui_ws/ HTTP/1.1\r\n" + own_headers(port, **upgrade, **changes))[0]
+    return "GET /_nicegui_ws/ HTTP/1.1\r\n" + own_headers(port, **asked, **changes)
+
+
+def handshake(port, **changes):
+    return raw(port, upgrade(port, **changes))[0]
 
 
 def test_handshakes_of_websockets(server):
@@ -811,15 +822,6 @@ def whole(first, text):
     return frame(first, len(text.encode()), text.encode())
 
 
-def received(link, end=None):
-    """All bytes until the server ends it, or until some come that end so."""
-    found = b""
-    with contextlib.suppress(ConnectionError):
-        while not (end and found.endswith(end)) and (part := link.recv(65536)):
-            found += part
-    return found
-
-
 # A client of a library may lose the reason of a refusal while it is still sending: a socket alone does not.
 @pytest.mark.promise("studio-20")
 @pytest.mark.parametrize(
@@ -834,17 +836,12 @@ def received(link, end=None):
 )
 def test_messages_of_a_websocket_are_bounded_by_the_server(server, large):
     port, process = server
-    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec_WebSocket_Version": "13"}
-    head = own_headers(port, Sec_WebSocket_Key="dGhlIHNhbXBsZSBub25jZQ==", **upgrade)
     with socket.create_connection(("127.0.0.1", port), timeout=HANG_S) as link:
-        link.sendall(f"GET / HTTP/1.1\r\n{head}\r\n".encode())
+        link.sendall(f"{upgrade(port)}\r\n".encode())
         assert b"101 Switching Protocols" in received(link, b"\r\n\r\n")
-        for most in (
-            whole(0x81, "a" * address.MESSAGE_BYTES),
-            whole(0x01, "a" * HALF) + whole(0x80, "a" * HALF),
-        ):
+        size = str(address.MESSAGE_BYTES).encode()
+        for most in (whole(0x81, "a" * address.MESSAGE_BYTES), whole(0x01, "a" * HALF) + whole(0x80, "a" * HALF)):
             link.sendall(most)
-            size = str(address.MESSAGE_BYTES).encode()
             assert received(link, size) == bytes([0x81, len(size)]) + size
         with contextlib.suppress(ConnectionError):
             link.sendall(large)
