@@ -332,6 +332,16 @@ def test_point_ahead_left_out_costs_the_budget_what_the_study_says(tmp_path, cha
     assert not not_corrected.point_ahead.corrected
 
 
+def test_a_point_ahead_left_out_is_added_to_each_error_of_a_map(tmp_path):
+    data = studied(tmp_path, UNCORRECTED).data
+    ahead, errors = data.shared.point_ahead_rad, np.array([0.0, 3e-6, 20e-6])
+    assert ahead == pytest.approx(71e-6, abs=1e-6)
+    without = replace(data, shared=replace(data.shared, point_ahead=None))
+    expected = link.margin_map(without, [3e8], errors + ahead)
+    assert link.margin_map(data, [3e8], errors) == pytest.approx(expected, abs=1e-9)
+    assert np.all(np.diff(expected) < -0.1)
+
+
 # ---------------------------------------------------------------------------------------------------- acquisition
 def reach_rad(power_w, half_rad, aperture_m, needed_w):
     """Angle off a Gaussian beam's axis at which an aperture at 44 000 km still receives what is needed."""

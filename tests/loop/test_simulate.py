@@ -346,6 +346,21 @@ def test_saturation_is_counted(tmp_path):
     assert 100e-6 < trace.peak_rad < 200e-6
 
 
+def test_behind_its_limit_the_states_of_a_controller_follow_what_was_given():
+    """The same samples by a recursion in which the states hear of the limit."""
+    limit = 2.0
+    setup = replace(IDEAL, drive=replace(IDEAL_DRIVE, minimum_v=-limit, maximum_v=limit))
+    trace, s = track(STRAIGHT, 15.0, setup), setup.controller
+    gain, x, expected = control.anti_windup(s)[:, 0], np.zeros(s.order), []
+    for error in trace.error_rad[:, 0]:
+        wanted = float(s.C[0] @ x + s.D[0, 0] * error)
+        expected.append(min(max(wanted, -limit), limit))
+        x = s.A @ x + s.B[:, 0] * error + gain * (expected[-1] - wanted)
+    at_limit = np.abs(expected) == limit
+    assert 0.2 < at_limit.mean() < 0.9
+    assert_allclose(trace.command_v[:, 0], expected, rtol=0, atol=1e-9)
+
+
 @pytest.mark.promise("readme-18")
 def test_slew_is_counted(tmp_path):
     """133 V/s where a 25 Hz sine needs 530 V/s; one plant step a sample, so that each shows in the trace."""

@@ -580,6 +580,8 @@ def test_a_sheet_grows_for_panels_that_have_no_room():
     found = layout(sheet)
     assert found.height > 0.5 * 72.0
     assert all(each.size[1] > 20.0 for each in found.placed)
+    lowest = max(each.outer[3] for each in found.placed)
+    assert found.height - 10.0 < lowest < found.height  # what stands below the last panel is on the sheet, and no more
 
 
 # ------------------------------------------------------------------------------------------------ legends
