@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from microrad.cli import frame
 from places import ROOT
 from reference import cases, comparing
 from reference.quantities import MOST, Quantity, flatten, quantities
@@ -242,6 +243,17 @@ def test_a_command_in_a_fork_ends_and_says_what_the_plain_one_does(call, folder)
     assert listed == call("presets", "--json") and listed[0] == 0
     assert refused == call("budget", "no.toml") and refused[0] == 2
     assert "no.toml" in refused[2]
+
+
+def test_what_is_said_beside_on_a_slow_machine_is_not_told(monkeypatch, tmp_path, capsys):
+    frame._progress_lines(0.0)(32, 192, "4.86 rows/s, 33 s left, margin 1 %: 3.42 dB")
+    progress = capsys.readouterr().err
+    assert progress == "microrad: 32 of 192: 4.86 rows/s, 33 s left, margin 1 %: 3.42 dB\n"
+    compiling = "microrad: compiling the loops for this processor: once, for about half a minute\n"
+    said = f"{compiling}{progress}microrad: 2 of them are none.\n"
+    monkeypatch.setattr(cases.warm, "run", lambda *_: (1, "found\n", said))
+    told = cases.Place(tmp_path).told("campaign", "run")
+    assert told == ["$ microrad campaign run", "found", "microrad: 2 of them are none.", "[1]"]
 
 
 # ------------------------------------------------------------------------------------------------------- what is there

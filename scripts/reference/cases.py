@@ -68,7 +68,8 @@ class Place:
         code, out, err = warm.run(command, self.folder, self._environment(), program)
         if code not in (0, 1, 2):
             raise CommandFailedError(f"microrad {' '.join(command)} ended with {code}: {err.strip()}")
-        said = re.sub(r"microrad: compiling the loops .*\n", "", err)  # where nobody has run them before
+        # Where nobody has run the loops before, and where a machine is slow.
+        said = re.sub(r"microrad: (?:compiling the loops|\d+ of \d+:) .*\n", "", err)
         return told.plain(f"$ microrad {' '.join(command)}\n{out}{said}[{code}]")
 
     def json(self, *words: object) -> Any:
