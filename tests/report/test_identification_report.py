@@ -1331,6 +1331,7 @@ def test_a_bouc_wen_fit_says_what_is_not_identified_and_how_many_starts_agreed()
         model=BoucWen(1e-3, 2e-6, 3e-4, 4e-5, 5.0, 1.5, rate_limit_v_s=700.0),
         covariance=covariance,
         not_identified=(ns(name="d2", reason="too slow"),),
+        admissible=True,
         agreeing_starts=3,
         start_rms_percent=(1.0, 2.0, 3.0, 4.0),
         condition_number=450.0,
@@ -1354,6 +1355,8 @@ def test_a_bouc_wen_fit_says_what_is_not_identified_and_how_many_starts_agreed()
         ("Condition number 450; the variances are inflated 1.75 times for the colour of the residual."),
     ]
     assert parameters.starts(fit) == (3, 4) and parameters.starts_text(fit) == "3 of 4 starts reached the best fit"
+    data = identification_numbers._parameter_data(fit)
+    assert (data["agreeing_starts"], data["starts"]) == (3, 4)
     rows = [[str(cell) for cell in row] for row in identification_page._model(fit).rows]
     assert rows == [
         ["d1", "1", "0.01", "mrad/V", ""],
